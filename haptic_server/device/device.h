@@ -1,0 +1,41 @@
+// The force display as the haptic loop sees it: one measurement in, one force out, every tick.
+// Behind it stand SPIDARs (spidar.h, over simulated or real motor boards) and the laboratory's ideal one.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/geometry.h"
+
+namespace rikiseki::haptic {
+
+enum class DeviceStatus : std::uint8_t {
+  kOk,
+  kFault,      // does not answer, or answers nonsense: nothing may be concluded from the sample
+};
+
+/// Where the finger is, in device coordinates (SI units).
+struct DeviceSample {
+  Vec3 position = Vec3::Zero();  // m, centre of the finger
+  Vec3 velocity = Vec3::Zero();  // m/s, as estimated by the device's own filter
+  Vec3 target = Vec3::Zero();    // m, where a simulated hand wants to be; the position on real devices
+};
+
+class Device {
+ public:
+  virtual ~Device() = default;
+
+  /// Measures. `now_ns` is the start of the tick. // RT: no allocation, lock, log or throw.
+  virtual DeviceStatus Read(std::int64_t now_ns, DeviceSample& sample) noexcept = 0;
+
+  /// Displays `force` [N, on the user, device axes] until the next call. Returns the force that is
+  /// really displayed after the device's own limits. // RT:
+  virtual Vec3 Write(const Vec3& force) noexcept = 0;
+
+  /// Lets go: zero force, minimum tension. Called on every way out. // RT:
+  virtual void Release() noexcept = 0;
+
+  virtual std::string Name() const = 0;
+};
+
+}  // namespace rikiseki::haptic

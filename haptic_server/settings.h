@@ -1,0 +1,103 @@
+// Everything a researcher may tune on the haptic side, with its defaults. settings.cpp gives the keys.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/config.h"
+#include "common/geometry.h"
+
+namespace rikiseki::haptic {
+
+enum class RealtimePolicy { kEnforce, kIgnore };  // enforce: refuse to start without it
+
+struct LoopSettings {
+  double rate_hz = 1000;
+  int fifo_priority = 80;
+  int cpu = -1;
+  RealtimePolicy realtime = RealtimePolicy::kIgnore;
+  int fault_after_misses = 20;  // deadlines in a row: force to zero
+  double longest_world_period_ms = 200;  // sizes the ring: slots >= 4 (Tw + latency) / T
+};
+
+/// How the surface is shown between two frames. numerics 1, paper 3.2.
+enum class DisplayRule { kInterpolate, kHold, kExtrapolate };
+
+struct RenderSettings {
+  double stiffness_n_per_m = 2000;  // of surfaces that bring none of their own
+  double damping_ns_per_m = 2;
+  bool adhesion = false;  // true: the literal damper of the paper, which may pull
+  DisplayRule display = DisplayRule::kInterpolate;
+  double finger_radius_mm = 10;
+};
+
+struct SafetySettings {
+  double force_cap_n = 10;
+  double slew_limit_n_per_s = 5000;
+  double speed_limit_m_per_s = 3;
+  double soft_start_ms = 200;   // the force grows over this after a world came
+  double fade_ms = 80;          // ... and goes to zero over this when it is lost
+  double late_periods = 2.5;    // no frame for this many world periods: hold
+  double lost_periods = 5;      // ... for this many, and at least lost_floor_ms: lost
+  double lost_floor_ms = 250;
+};
+
+enum class DeviceKind { kSimulated };
+
+struct DeviceSettings {
+  DeviceKind kind = DeviceKind::kSimulated;
+  std::string file;  // motor positions, counts, tension bounds: config/devices/*.ini
+};
+
+enum class HandScript { kPush, kRest };
+
+/// The simulated hand: a minimum-jerk motor program plus the impedance of the hand. numerics 5.
+/// Mass and damping are of the hand alone; the device's own are in the device file.
+struct HandSettings {
+  HandScript script = HandScript::kPush;
+  double mass_kg = 0.9;
+  double damping_ns_per_m = 15;
+  double stiffness_n_per_m = 500;
+  Vec3 home_mm = Vec3(-50, 0, 0);    // where a push starts and ends
+  Vec3 stroke_mm = Vec3(150, 0, 0);  // the reach of one push
+  double reach_ms = 300;             // there
+  double hold_ms = 100;
+  double return_ms = 300;            // and back
+  double rest_ms = 500;              // between two pushes, plus a random part
+  double rest_jitter_ms = 100;       // uniform from 0 to this: meets every phase of the world
+  int seed = 1;
+};
+
+/// Motor positions and electronics of a 4-string SPIDAR. notes of config/devices/*.ini.
+struct SpidarSettings {
+  std::vector<Vec3> motors_m;         // in device axes
+  double count_length_m = 2.92406e-5; // string length per encoder count
+  double tension_min_n = 0.5;
+  double tension_max_n = 20;
+  double velocity_cutoff_hz = 100;    // of the first-order velocity filter
+  double moving_mass_kg = 0.03;
+  double friction_damping_ns_per_m = 0.2;
+};
+
+struct Settings {
+  LoopSettings loop;
+  RenderSettings render;
+  SafetySettings safety;
+  DeviceSettings device;
+  HandSettings hand;
+  SpidarSettings spidar;
+
+  std::int64_t period_ns() const;
+};
+
+/// Reads the daemon's file, the overrides and the device file it names, and checks them against each
+/// other. `description`, if given, receives every key with value and origin. Throws ConfigError.
+Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
+                      std::string* description = nullptr);
+
+/// The checks that involve several keys; throws std::invalid_argument naming them. For settings that
+/// come from code, not from a file.
+void CheckSettings(const Settings& settings);
+
+}  // namespace rikiseki::haptic

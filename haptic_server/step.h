@@ -1,0 +1,53 @@
+// One tick of the haptic loop over plain state: device.read -> feature track -> contact solve -> surface
+// force -> safety -> device.write -> ledger -> (local bodies: issue 3) -> message. The clock, the device
+// and the peer are passed in: the daemon drives it with real time, the laboratory with virtual time.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "haptic_server/device/device.h"
+#include "haptic_server/settings.h"
+#include "protocol/messages.h"
+
+namespace rikiseki::haptic {
+
+/// When this tick happens.
+struct TickTime {
+  std::int64_t start_ns = 0;              // t_k
+  std::int64_t previous_duration_ns = 0;  // the true t_k - t_(k-1); 0 on the first tick
+  std::int64_t missed = 0;                // deadlines skipped between the tick before and this one
+};
+
+/// What the shell knows of the world at this tick.
+struct WorldInput {
+  std::uint64_t epoch = 0;        // of the attached segment; 0 = none
+  bool ready = false;             // its owner says so, and lives
+  std::int64_t heartbeat_ns = 0;  // its owner's last sign of life
+  const protocol::WorldFrame* frame = nullptr;  // the newest frame, if it was not handed over before
+};
+
+/// The haptic loop's state between ticks. Everything is allocated by the constructor.
+class HapticStep {
+ public:
+  /// `device` outlives the step. Throws std::invalid_argument on settings that CheckSettings refuses.
+  HapticStep(const Settings& settings, Device& device);
+  ~HapticStep();
+  HapticStep(const HapticStep&) = delete;
+  HapticStep& operator=(const HapticStep&) = delete;
+
+  /// Runs one tick and fills the message to publish. // RT: no allocation, lock, log or throw.
+  void Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message) noexcept;
+
+  /// Zero force and minimum tension; the message says kStopped. // RT:
+  void Stop(protocol::HapticTick& message) noexcept;
+
+  /// Reason, peer, books and extremes; the shell adds what it knows of the loop. // RT:
+  const protocol::HapticHealth& health() const noexcept;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace rikiseki::haptic

@@ -1,0 +1,50 @@
+// Everything a researcher may tune on the world side, with its defaults. settings.cpp gives the keys.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/config.h"
+#include "protocol/messages.h"
+
+namespace rikiseki::world {
+
+struct LoopSettings {
+  double rate_hz = 20;
+};
+
+struct SceneSettings {
+  std::string file;  // an SDFormat world
+};
+
+struct PhysicsSettings {
+  double substep_ms = 1;
+};
+
+struct CouplingSettings {
+  protocol::Coupling coupling = protocol::Coupling::kImpulse;
+  double force_cap_n = 20;  // bounds what is applied after a gap: at most force_cap * gap
+  double gap_ms = 0;        // 0 = max(100 ms, 3 periods)
+};
+
+struct FeatureSettings {
+  double radius_mm = 20;  // r_0: planes of bodies within r_0 + 2 Tw v_rel of the finger are sent
+};
+
+struct Settings {
+  LoopSettings loop;
+  SceneSettings scene;
+  PhysicsSettings physics;
+  CouplingSettings coupling;
+  FeatureSettings features;
+
+  std::int64_t period_ns() const;
+  double gap_s() const;
+};
+
+/// Reads the daemon's file and the overrides and checks them. Throws ConfigError.
+Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
+                      std::string* description = nullptr);
+
+}  // namespace rikiseki::world
