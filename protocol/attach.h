@@ -16,6 +16,7 @@
 #include "protocol/owner.h"
 #include "protocol/ring.h"
 #include "protocol/segment.h"
+#include "protocol/shared_object.h"
 #include "protocol/stream.h"
 
 namespace rikiseki::protocol {
@@ -46,16 +47,6 @@ struct AttachRequest {
 
 /// This process's user, root, and the users haptics-device and haptics-world where they exist.
 std::vector<uid_t> DefaultOwners();
-
-/// Identity of a shared-memory object; {0, 0} = none.
-struct ObjectId {
-  dev_t device = 0;
-  ino_t inode = 0;
-  bool operator==(const ObjectId&) const = default;
-};
-
-/// The object that presently bears the name.
-ObjectId FindObject(const std::string& name) noexcept;
 
 /// An attached segment. All its numbers are private copies, checked.
 class PeerView {

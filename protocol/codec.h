@@ -12,6 +12,7 @@
 #include <span>
 
 #include "protocol/messages.h"
+#include "protocol/validate.h"
 
 namespace rikiseki::protocol {
 
@@ -20,21 +21,6 @@ struct Encoded {
   std::uint32_t used_bytes = 0;  // a multiple of 8
   std::uint32_t blocks = 0;
 };
-
-enum class DecodeStatus : std::uint32_t {
-  kOk,
-  kLength,      // used_bytes does not agree with the counts and blocks
-  kCount,       // more pointers, channels, planes or bodies than there may be
-  kEnumerator,  // a number that names nothing
-  kIdentity,    // a pointer that does not exist or stands twice
-  kNotFinite,
-  kRange,       // a value that cannot be: negative radius, zero period, ...
-  kQuaternion,  // norm outside 0.99 .. 1.01
-  kNormal,      // norm not above 1e-12
-};
-
-/// "a value is not finite", ...
-const char* Describe(DecodeStatus status) noexcept;
 
 // Optional blocks: bits of SlotHeader.blocks. They follow in the order of their bits.
 inline constexpr std::uint32_t kTickRotations = 1;  // orientation, angular velocity, torque

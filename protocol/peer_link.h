@@ -68,6 +68,9 @@ class PeerLink {
  private:
   void Run() noexcept;
   void Step();
+  void TakeBack();
+  void WatchNewest();
+  void LookForPeer();
   void Report(const std::string& line);
 
   const PeerLinkOptions options_;
@@ -75,13 +78,13 @@ class PeerLink {
   PeerView* current_ = nullptr;  // of the loop
   std::atomic<PeerView*> offered_{nullptr};
   std::atomic<PeerView*> retired_{nullptr};
-  std::atomic<bool> refuse_{false};
+  std::atomic<PeerView*> refused_{nullptr};
   std::atomic<bool> incompatible_{false};
 
   // Of the attacher.
   std::vector<std::unique_ptr<PeerView>> views_;  // the newest last
   ObjectId unreadable_;                           // not tried again
-  std::string last_text_;                         // not reported again
+  std::string last_report_;                       // not repeated
 
   std::mutex mutex_;  // never taken by the loop
   std::condition_variable wake_;

@@ -138,7 +138,7 @@ class StreamReader {
 
  private:
   bool Copy(std::uint64_t number, std::span<std::uint64_t> payload, Received& received) noexcept;
-  ReadStatus Return(std::span<const std::uint64_t> payload, const Received& received) noexcept;
+  ReadStatus Return(const Received& received) noexcept;
 
   Ring ring_;
   std::uint64_t cursor_ = 0;

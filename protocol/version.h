@@ -11,6 +11,6 @@ inline constexpr std::uint16_t kVersionMajor = 0;
 inline constexpr std::uint16_t kVersionMinor = 1;
 
 /// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
-inline constexpr std::uint64_t kLayoutHash = 0;
+inline constexpr std::uint64_t kLayoutHash = 0x7F44583709F045DAULL;
 
 }  // namespace rikiseki::protocol
