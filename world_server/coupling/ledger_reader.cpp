@@ -1,0 +1,175 @@
+#include "world_server/coupling/ledger_reader.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rikiseki::world {
+namespace {
+
+using protocol::DiscardReason;
+using protocol::ImpulseUnits;
+
+// No finger reaches farther from the world origin: bounds hostile angular totals through the gap
+// rule.
+constexpr double kLongestLever = 10.0;  // m
+
+// What stays within an int64 of impulse units with room to spare, whatever the configuration says.
+constexpr double kLargestCountable = 4e6;  // N s, N m s
+
+std::int64_t Plus(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+}
+std::int64_t Minus(std::int64_t a, std::int64_t b) {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+}
+ImpulseUnits Plus(const ImpulseUnits& a, const ImpulseUnits& b) {
+  return {Plus(a[0], b[0]), Plus(a[1], b[1]), Plus(a[2], b[2])};
+}
+ImpulseUnits Minus(const ImpulseUnits& a, const ImpulseUnits& b) {
+  return {Minus(a[0], b[0]), Minus(a[1], b[1]), Minus(a[2], b[2])};
+}
+Vec3 InSi(const ImpulseUnits& units) {
+  return Vec3(static_cast<double>(units[0]), static_cast<double>(units[1]),
+              static_cast<double>(units[2])) *
+         protocol::kImpulseUnit;
+}
+
+}  // namespace
+
+ImpulseUnits LedgerBooks::TotalDiscarded() const {
+  ImpulseUnits sum{};
+  for (const ImpulseUnits& units : discarded) sum = Plus(sum, units);
+  return sum;
+}
+
+bool LedgerReader::KnownChannel::Is(const protocol::Channel& channel) const {
+  return body == channel.body && generation == channel.generation && pointer == channel.pointer &&
+         opened_tick == channel.opened_tick;
+}
+
+LedgerReader::LedgerReader(std::uint64_t own_epoch, protocol::Coupling coupling,
+                           double largest_impulse_ns)
+    : own_epoch_(own_epoch), coupling_(coupling), largest_impulse_ns_(largest_impulse_ns) {}
+
+void LedgerReader::SetBodies(std::vector<BodyTag> bodies) {
+  ImpulseUnits owed{};
+  for (const OwedUnits& body : owed_) owed = Plus(owed, body.impulse);
+  const auto reason = static_cast<std::size_t>(DiscardReason::kUnknownBody);
+  life_books_.discarded[reason] = Plus(life_books_.discarded[reason], owed);
+  epoch_books_.discarded[reason] = Plus(epoch_books_.discarded[reason], Minus(owed, owed_before_));
+  owed_before_ = {};
+  bodies_ = std::move(bodies);
+  owed_.assign(bodies_.size(), {});
+}
+
+void LedgerReader::BeginEpoch(std::uint64_t epoch) {
+  epoch_ = epoch;
+  has_baseline_ = false;
+  known_.clear();
+  epoch_books_ = {};
+  owed_before_ = {};
+  for (const OwedUnits& body : owed_) owed_before_ = Plus(owed_before_, body.impulse);
+}
+
+void LedgerReader::Discard(const ImpulseUnits& impulse, DiscardReason reason) {
+  for (LedgerBooks* books : {&epoch_books_, &life_books_}) {
+    ImpulseUnits& sum = books->discarded[static_cast<std::size_t>(reason)];
+    sum = Plus(sum, impulse);
+  }
+}
+
+std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::HapticTick& tick) {
+  const std::size_t count = std::min(tick.channel_count, protocol::kMaxChannels);
+  std::vector<KnownChannel> present;
+  std::vector<Increment> increments;
+  for (const protocol::Channel& channel : std::span(tick.channels).first(count)) {
+    const auto is_same = [&](const KnownChannel& known) { return known.Is(channel); };
+    if (std::any_of(present.begin(), present.end(), is_same)) continue;  // said twice: once counts
+    const KnownChannel now{.body = channel.body,
+                           .generation = channel.generation,
+                           .pointer = channel.pointer,
+                           .opened_tick = channel.opened_tick,
+                           .impulse = channel.impulse,
+                           .angular_impulse = channel.angular_impulse};
+    present.push_back(now);
+
+    KnownChannel before = now;
+    const auto known = std::find_if(known_.begin(), known_.end(), is_same);
+    if (known != known_.end()) {
+      before = *known;
+    } else if (has_baseline_ && channel.opened_tick > last_tick_) {
+      before.impulse = before.angular_impulse = {};
+    }  // else it is part of the baseline, or its history is unknown: it counts from here
+    increments.push_back({.body = channel.body,
+                          .generation = channel.generation,
+                          .impulse = Minus(now.impulse, before.impulse),
+                          .angular_impulse = Minus(now.angular_impulse, before.angular_impulse)});
+  }
+  known_ = std::move(present);
+  return increments;
+}
+
+bool LedgerReader::Consume(const protocol::HapticTick& tick) {
+  if (has_baseline_ && tick.tick <= last_tick_) return false;
+  const std::vector<Increment> increments = IncrementsOf(tick);
+  if (!has_baseline_) {
+    has_baseline_ = true;
+    baseline_tick_ = tick.tick;
+  }
+  last_tick_ = tick.tick;
+
+  const bool by_position = coupling_ == protocol::Coupling::kPosition;
+  const bool foreign = own_epoch_ != 0 && tick.world_epoch != own_epoch_;
+  if (by_position || foreign) {
+    for (const Increment& increment : increments) {
+      Discard(increment.impulse,
+              by_position ? DiscardReason::kCoupling : DiscardReason::kForeignWorld);
+    }
+    return true;
+  }
+
+  const auto can_move = [&](const Increment& increment) {
+    return increment.body < bodies_.size() && bodies_[increment.body].movable &&
+           bodies_[increment.body].generation == increment.generation;
+  };
+  for (const Increment& increment : increments) {
+    if (!can_move(increment)) continue;
+    consumed_ns_ += InSi(increment.impulse).norm();
+    consumed_nms_ += InSi(increment.angular_impulse).norm();
+  }
+  const bool gap = consumed_ns_ > std::min(largest_impulse_ns_, kLargestCountable) ||
+                   consumed_nms_ > std::min(largest_impulse_ns_ * kLongestLever, kLargestCountable);
+  for (const Increment& increment : increments) {
+    if (!can_move(increment)) {
+      Discard(increment.impulse, DiscardReason::kUnknownBody);
+    } else if (gap) {
+      Discard(increment.impulse, DiscardReason::kGap);
+    } else {
+      OwedUnits& owed = owed_[increment.body];
+      owed.impulse = Plus(owed.impulse, increment.impulse);
+      owed.angular_impulse = Plus(owed.angular_impulse, increment.angular_impulse);
+    }
+  }
+  return true;
+}
+
+std::span<const PendingImpulse> LedgerReader::Take() {
+  taken_.clear();
+  ImpulseUnits sum{};
+  for (std::size_t body = 0; body < owed_.size(); ++body) {
+    OwedUnits& owed = owed_[body];
+    if (owed.impulse == ImpulseUnits{} && owed.angular_impulse == ImpulseUnits{}) continue;
+    sum = Plus(sum, owed.impulse);
+    taken_.push_back({.body = body,
+                      .impulse = InSi(owed.impulse),
+                      .angular_impulse = InSi(owed.angular_impulse)});
+    owed = {};
+  }
+  life_books_.applied = Plus(life_books_.applied, sum);
+  epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, owed_before_));
+  owed_before_ = {};
+  consumed_ns_ = consumed_nms_ = 0;
+  return taken_;
+}
+
+}  // namespace rikiseki::world

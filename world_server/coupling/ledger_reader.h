@@ -1,0 +1,113 @@
+// The world's end of the impulse ledger: turns the cumulative totals of haptic ticks into what each
+// body is owed, and keeps the books of what was applied and what was declared not applied. SPEC.md
+// section 7.
+//
+// Invariant, per axis and exactly (int64, modulo 2^64), whenever nothing is pending:
+//   applied + discarded == sum over channels of the totals' growth since the baseline message.
+// Hostile totals can do no more harm than the gap rule lets through.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/geometry.h"
+#include "protocol/messages.h"
+
+namespace rikiseki::world {
+
+/// Who a channel may push: the body's present generation, and whether it can move.
+struct BodyTag {
+  std::uint32_t generation = 1;
+  bool movable = false;
+};
+
+/// What one body is owed, about the world origin, in W.
+struct PendingImpulse {
+  std::size_t body = 0;
+  Vec3 impulse = Vec3::Zero();          // N s
+  Vec3 angular_impulse = Vec3::Zero();  // N m s
+};
+
+/// Linear impulse since a baseline.
+struct LedgerBooks {
+  protocol::ImpulseUnits applied{};
+  std::array<protocol::ImpulseUnits, protocol::kDiscardReasons> discarded{};
+
+  protocol::ImpulseUnits TotalDiscarded() const;
+};
+
+class LedgerReader {
+ public:
+  /// `own_epoch` 0 accepts ticks whatever world they were displayed against. One world tick takes
+  /// no more than `largest_impulse_ns` (force cap times gap): messages beyond it are discarded
+  /// whole.
+  LedgerReader(std::uint64_t own_epoch, protocol::Coupling coupling, double largest_impulse_ns);
+
+  /// Names the bodies. What is pending for the ones before is discarded as kUnknownBody.
+  void SetBodies(std::vector<BodyTag> bodies);
+
+  /// The next message is a baseline: nothing of it is owed. What is pending stays owed.
+  void BeginEpoch(std::uint64_t epoch);
+
+  /// One message; false, and nothing else, if it is not newer than the one before.
+  bool Consume(const protocol::HapticTick& tick);
+
+  /// Hands out what every body is owed, which counts as applied, and closes the world tick.
+  std::span<const PendingImpulse> Take();
+
+  std::uint64_t acked_epoch() const { return has_baseline_ ? epoch_ : 0; }
+  std::uint64_t acked_tick() const { return has_baseline_ ? last_tick_ : 0; }
+  std::uint64_t baseline_tick() const { return has_baseline_ ? baseline_tick_ : 0; }
+
+  /// Since the baseline of the present epoch; complete after Take().
+  const LedgerBooks& epoch_books() const { return epoch_books_; }
+  /// Since this reader was made.
+  const LedgerBooks& life_books() const { return life_books_; }
+
+ private:
+  struct KnownChannel {
+    std::uint32_t body = 0, generation = 0, pointer = 0;
+    std::uint64_t opened_tick = 0;
+    protocol::ImpulseUnits impulse{};
+    protocol::ImpulseUnits angular_impulse{};
+
+    bool Is(const protocol::Channel& channel) const;
+  };
+  struct Increment {
+    std::uint32_t body = 0, generation = 0;
+    protocol::ImpulseUnits impulse{};
+    protocol::ImpulseUnits angular_impulse{};
+  };
+  struct OwedUnits {
+    protocol::ImpulseUnits impulse{};
+    protocol::ImpulseUnits angular_impulse{};
+  };
+
+  /// Growth of every channel since the message before, which this one replaces.
+  std::vector<Increment> IncrementsOf(const protocol::HapticTick& tick);
+  void Discard(const protocol::ImpulseUnits& impulse, protocol::DiscardReason reason);
+
+  std::uint64_t own_epoch_;
+  protocol::Coupling coupling_;
+  double largest_impulse_ns_;
+
+  std::uint64_t epoch_ = 0;
+  bool has_baseline_ = false;
+  std::uint64_t baseline_tick_ = 0;
+  std::uint64_t last_tick_ = 0;
+  std::vector<KnownChannel> known_;  // of the last message
+
+  std::vector<BodyTag> bodies_;
+  std::vector<OwedUnits> owed_;           // by body
+  protocol::ImpulseUnits owed_before_{};  // of it, from epochs before this one
+  double consumed_ns_ = 0;                // sum of |q| over this world tick
+  double consumed_nms_ = 0;               // of the angular ones
+  std::vector<PendingImpulse> taken_;
+
+  LedgerBooks epoch_books_;
+  LedgerBooks life_books_;
+};
+
+}  // namespace rikiseki::world

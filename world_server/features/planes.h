@@ -1,0 +1,42 @@
+// The planes that the haptic side renders: for every finger and every shape near it the tangent
+// plane at the shape's nearest point, normal towards the finger. Paper 3.1.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "protocol/messages.h"
+#include "world_server/physics/dynamics_world.h"
+#include "world_server/scene/scene.h"
+
+namespace rikiseki::world {
+
+/// How far shapes are sought: r_0 + 2 Tw |v_rel| from the finger sphere's surface, so that nothing
+/// can be reached before the frame after next. numerics.md section 4.
+struct FeatureReach {
+  double radius_m = 0;  // r_0
+  double period_s = 0;  // Tw
+};
+
+/// A finger that can be computed with: everything finite, the radius within 0..kLargestFinger.
+struct Finger {
+  std::uint32_t pointer = 0;
+  double radius_m = 0;
+  Vec3 position = Vec3::Zero();  // of the sphere's centre, in W
+  Vec3 velocity = Vec3::Zero();  // m/s
+};
+
+inline constexpr double kLargestFinger = 1.0;  // m
+
+/// The usable fingers of a message, each pointer once; what is not finite is left out.
+std::vector<Finger> FingersOf(const protocol::HapticTick& tick);
+
+/// Fills `planes` nearest first, at most its length, and returns how many. A plane's feature is the
+/// place of its collider within the body. `states` and `generations` go with `scene.bodies`.
+std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
+                         std::span<const std::uint32_t> generations,
+                         std::span<const Finger> fingers, const FeatureReach& reach,
+                         std::span<protocol::Plane> planes);
+
+}  // namespace rikiseki::world

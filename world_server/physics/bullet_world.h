@@ -1,0 +1,39 @@
+// Rigid bodies on Bullet in double precision, tuned as measured for this project: no margins, split
+// impulse, 50 iterations, one friction direction, our own fixed substeps.
+//
+// What that gives at 1 ms substeps: a sliding box stops v h / 2 short, free fall is g t h / 2 off
+// in position and exact in velocity, stacks of ten 5 cm boxes and mass ratios up to 1:300 hold.
+// Combined friction is sqrt(mu1 mu2). Repeatable to the bit for the same scene and the same calls.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "world_server/physics/dynamics_world.h"
+#include "world_server/scene/scene.h"
+
+namespace rikiseki::world {
+
+class BulletWorld final : public DynamicsWorld {
+ public:
+  /// A period is divided into equal substeps, none longer than `longest_substep_s`. Throws
+  /// std::invalid_argument on what the engine cannot take: a moving body without a mass, a positive
+  /// definite inertia or a shape, with a half-space, or with shapes of different friction.
+  BulletWorld(const Scene& scene, double longest_substep_s);
+  ~BulletWorld() override;
+
+  std::size_t body_count() const override;
+  BodyState State(std::size_t body) const override;
+  void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
+
+  /// False for a scene in which nothing moves: no engine was built, and steps cost nothing.
+  bool simulates() const;
+
+ private:
+  struct Engine;
+  std::vector<BodyState> fixed_;  // start states; those of fixed bodies stay valid
+  double longest_substep_s_;
+  std::unique_ptr<Engine> engine_;  // null where nothing moves
+};
+
+}  // namespace rikiseki::world

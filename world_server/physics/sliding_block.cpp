@@ -1,0 +1,54 @@
+#include "world_server/physics/sliding_block.h"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace rikiseki::world {
+
+SlidingBlock::SlidingBlock(const Scene& scene, double friction, SlideRule rule)
+    : deceleration_(friction * std::abs(scene.gravity.z())), rule_(rule) {
+  std::size_t moving = 0;
+  for (const SceneBody& body : scene.bodies) {
+    states_.push_back({.pose = body.pose_WB});
+    if (body.fixed) continue;
+    ++moving;
+    block_ = states_.size() - 1;
+    mass_kg_ = body.mass_kg;
+  }
+  if (moving != 1 || !(mass_kg_ > 0)) {
+    throw std::invalid_argument("a sliding block needs exactly one moving body with a mass");
+  }
+}
+
+BodyState SlidingBlock::State(std::size_t body) const {
+  BodyState state = states_[body];
+  if (body == block_) {
+    state.pose.position.x() += displacement_;
+    state.velocity.x() = velocity_;
+  }
+  return state;
+}
+
+void SlidingBlock::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
+  for (const Kick& kick : kicks) {
+    if (kick.body == block_) velocity_ += kick.impulse.x() / mass_kg_;
+  }
+  const double v = velocity_;
+  const double loss = deceleration_ * period_s;
+  const bool stops = std::abs(v) <= loss;
+  velocity_ = stops ? 0 : v - std::copysign(loss, v);
+  switch (rule_) {
+    case SlideRule::kExact:
+      if (!stops) {
+        displacement_ += period_s * v - std::copysign(loss, v) * period_s / 2;
+      } else if (v != 0) {
+        displacement_ += v * std::abs(v) / (2 * deceleration_);
+      }
+      break;
+    case SlideRule::kSemiImplicit:
+      displacement_ += period_s * velocity_;
+      break;
+  }
+}
+
+}  // namespace rikiseki::world

@@ -1,0 +1,41 @@
+// One block that slides along x on a floor with Coulomb friction: the world of the paper's Fig. 6,
+// in closed form per world period, where rigid-body engines would add their own error.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "world_server/physics/dynamics_world.h"
+#include "world_server/scene/scene.h"
+
+namespace rikiseki::world {
+
+/// How friction acts over one period. numerics.md section 5.
+enum class SlideRule {
+  kExact,         // EX: uniform deceleration, stops after v^2 / (2 mu g)
+  kSemiImplicit,  // SE: friction first, then x += Tw v; stops v Tw / 2 short
+};
+
+/// The scene's only moving body slides; the others stay. One period is one step of the rule.
+/// Rotation, and impulses across x, do nothing.
+class SlidingBlock final : public DynamicsWorld {
+ public:
+  /// `friction` is that of block and floor combined; the weight is along z of `scene.gravity`.
+  /// Throws std::invalid_argument unless exactly one body moves and has a mass.
+  SlidingBlock(const Scene& scene, double friction, SlideRule rule);
+
+  std::size_t body_count() const override { return states_.size(); }
+  BodyState State(std::size_t body) const override;
+  void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
+
+ private:
+  std::vector<BodyState> states_;  // at the start
+  std::size_t block_ = 0;
+  double mass_kg_ = 0;
+  double deceleration_ = 0;  // mu g, m/s^2
+  SlideRule rule_;
+  double displacement_ = 0;  // m along x since the start
+  double velocity_ = 0;      // m/s along x
+};
+
+}  // namespace rikiseki::world

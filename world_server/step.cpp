@@ -1,0 +1,160 @@
+#include "world_server/step.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include "world_server/coupling/kick.h"
+#include "world_server/coupling/ledger_reader.h"
+#include "world_server/features/planes.h"
+
+namespace rikiseki::world {
+
+struct WorldStep::State {
+  Settings settings;
+  Scene scene;
+  std::unique_ptr<DynamicsWorld> dynamics;
+  std::vector<BodyState> states;
+  std::vector<std::uint32_t> generations;  // may be longer than the scene: numbers are never reused
+  LedgerReader ledger;
+  std::vector<Finger> fingers;   // of the newest message
+  double stiffness_n_per_m = 0;  // that it renders with
+  double silence_s = 0;          // world time since it came
+  std::uint64_t frame = 0;
+  std::int64_t world_time_ns = 0;
+  std::vector<protocol::Body> bodies;
+  protocol::WorldHealth health;
+
+  State(const Settings& given, std::uint64_t own_epoch)
+      : settings(given),
+        ledger(own_epoch, given.coupling.coupling, given.coupling.force_cap_n * given.gap_s()) {
+    health.coupling = given.coupling.coupling;
+    health.period_ns = static_cast<std::uint64_t>(given.period_ns());
+  }
+
+  void Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics);
+  void ReadStates();
+  std::vector<Kick> Kicks(double period_s);
+};
+
+void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics) {
+  if (!new_dynamics || new_dynamics->body_count() != new_scene.bodies.size()) {
+    throw std::invalid_argument("the dynamics must hold exactly the bodies of the scene");
+  }
+  scene = new_scene;
+  dynamics = std::move(new_dynamics);
+  for (std::uint32_t& generation : generations) ++generation;
+  generations.resize(std::max(generations.size(), scene.bodies.size()), 1);
+
+  std::vector<BodyTag> tags;
+  bodies.assign(scene.bodies.size(), {});
+  health.moving_bodies = 0;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const SceneBody& body = scene.bodies[i];
+    tags.push_back({.generation = generations[i], .movable = !body.fixed});
+    bodies[i].body = static_cast<std::uint32_t>(i);
+    bodies[i].generation = generations[i];
+    bodies[i].mass = body.fixed ? 0 : body.mass_kg;
+    if (!body.fixed) ++health.moving_bodies;
+  }
+  ledger.SetBodies(std::move(tags));
+  health.scene = {};
+  const std::size_t length = std::min(scene.name.size(), health.scene.size() - 1);
+  std::copy_n(scene.name.begin(), length, health.scene.begin());
+  ReadStates();
+}
+
+void WorldStep::State::ReadStates() {
+  states.resize(scene.bodies.size());
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    states[i] = dynamics->State(i);
+    bodies[i].position = ToArray(states[i].pose.position);
+    bodies[i].orientation = ToArray(states[i].pose.orientation);
+    bodies[i].velocity = ToArray(states[i].velocity);
+    bodies[i].angular_velocity = ToArray(states[i].angular_velocity);
+  }
+}
+
+std::vector<Kick> WorldStep::State::Kicks(double period_s) {
+  const std::span<const PendingImpulse> owed = ledger.Take();
+  if (settings.coupling.coupling == protocol::Coupling::kImpulse) return ImpulseKicks(owed, states);
+  // A finger that has not been heard of for a gap pushes no longer.
+  if (silence_s > settings.gap_s()) return {};
+  return PenaltyKicks(scene, states, fingers,
+                      {.stiffness_n_per_m = stiffness_n_per_m,
+                       .period_s = period_s,
+                       .largest_impulse_ns = settings.coupling.force_cap_n * settings.gap_s()});
+}
+
+WorldStep::WorldStep(const Settings& settings, const Scene& scene,
+                     std::unique_ptr<DynamicsWorld> dynamics, std::uint64_t own_epoch)
+    : state_(std::make_unique<State>(settings, own_epoch)) {
+  if (settings.coupling.coupling != protocol::Coupling::kPosition &&
+      settings.coupling.coupling != protocol::Coupling::kImpulse) {
+    throw std::invalid_argument("coupling.coupling: position and impulse exist");
+  }
+  state_->Adopt(scene, std::move(dynamics));
+}
+
+WorldStep::~WorldStep() = default;
+
+void WorldStep::BeginHapticEpoch(std::uint64_t epoch) {
+  state_->ledger.BeginEpoch(epoch);
+  state_->fingers.clear();
+  state_->health.peer_epoch = epoch;
+}
+
+void WorldStep::Consume(const protocol::HapticTick& tick) {
+  if (!state_->ledger.Consume(tick)) return;
+  state_->fingers = FingersOf(tick);
+  state_->stiffness_n_per_m = tick.stiffness;
+  state_->silence_s = 0;
+}
+
+void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
+  State& s = *state_;
+  const std::vector<Kick> kicks = s.Kicks(period_s);
+  s.dynamics->ApplyAndStep(kicks, period_s);
+  s.silence_s += period_s;
+  s.world_time_ns += std::llround(period_s * 1e9);
+  s.ReadStates();
+
+  frame = {};
+  frame.frame = ++s.frame;
+  frame.world_time_ns = static_cast<std::uint64_t>(s.world_time_ns);
+  frame.period_ns = s.health.period_ns;
+  frame.acked_epoch = s.ledger.acked_epoch();
+  frame.acked_tick = s.ledger.acked_tick();
+  frame.baseline_tick = s.ledger.baseline_tick();
+  frame.applied = s.ledger.epoch_books().applied;
+  frame.discarded = s.ledger.epoch_books().TotalDiscarded();
+  frame.coupling = s.settings.coupling.coupling;
+  frame.plane_count = FindPlanes(s.scene, s.states, s.generations, s.fingers,
+                                 {.radius_m = s.settings.features.radius_mm * 1e-3,
+                                  .period_s = static_cast<double>(s.settings.period_ns()) * 1e-9},
+                                 frame.planes);
+
+  s.health.frames = s.frame;
+  s.health.applied = s.ledger.life_books().applied;
+  s.health.discarded = s.ledger.life_books().discarded;
+  if (s.settings.coupling.coupling == protocol::Coupling::kPosition) {
+    Vec3 penalty = ToVec3(s.health.penalty_impulse);
+    for (const Kick& kick : kicks) penalty += kick.impulse;
+    s.health.penalty_impulse = ToArray(penalty);
+  }
+}
+
+void WorldStep::Replace(const Scene& scene, std::unique_ptr<DynamicsWorld> dynamics) {
+  state_->Adopt(scene, std::move(dynamics));
+  ++state_->health.resets;
+}
+
+const std::vector<protocol::Body>& WorldStep::Bodies() const {
+  return state_->bodies;
+}
+
+const protocol::WorldHealth& WorldStep::health() const {
+  return state_->health;
+}
+
+}  // namespace rikiseki::world
