@@ -30,8 +30,10 @@ struct WorldInput {
 /// The haptic loop's state between ticks. Everything is allocated by the constructor.
 class HapticStep {
  public:
-  /// `device` outlives the step. Throws std::invalid_argument on settings that CheckSettings refuses.
-  HapticStep(const Settings& settings, Device& device);
+  /// `device` outlives the step. `own_epoch` is the epoch of the segment that the messages will be
+  /// published in; frames that acknowledge another one cover nothing. 0 accepts any (the laboratory).
+  /// Throws std::invalid_argument on settings that CheckSettings refuses.
+  HapticStep(const Settings& settings, Device& device, std::uint64_t own_epoch);
   ~HapticStep();
   HapticStep(const HapticStep&) = delete;
   HapticStep& operator=(const HapticStep&) = delete;
