@@ -5,32 +5,9 @@
 #include <atomic>
 #include <catch2/catch.hpp>
 #include <chrono>
-#include <cstdlib>
 #include <map>
-#include <new>
 #include <thread>
 #include <vector>
-
-#include "protocol/stream.h"
-#include "tests/protocol/support.h"
-
-namespace {
-std::atomic<std::uint64_t> allocations{0};
-}  // namespace
-
-// Counts every allocation of this test program. Not inlined, so that the compiler sees matching
-// pairs.
-[[gnu::noinline]] void* operator new(std::size_t bytes) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  if (void* memory = std::malloc(bytes != 0 ? bytes : 1)) return memory;
-  throw std::bad_alloc();
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
 
 namespace rikiseki::protocol {
 namespace {
@@ -353,29 +330,50 @@ TEST_CASE("a reader that is overtaken accepts nothing torn") {
   CHECK(TornAcceptedWhenOvertaken(0) > 0);
 }
 
+/// Stores as the shipped writer does, but lets the reader run in the midst of a message now and
+/// then: on a busy machine the scheduler alone would hardly ever do so.
+struct YieldingStore {
+  std::uint64_t* count;
+  void operator()(std::uint64_t& word, std::uint64_t value, std::memory_order order) {
+    std::atomic_ref<std::uint64_t>(word).store(value, order);
+    if (++*count % 61 == 0) std::this_thread::yield();
+  }
+};
+
 TEST_CASE("two threads at full speed: nothing torn, nothing backwards, seldom contended") {
-  for (const std::uint32_t slots : {2u, 4u}) {
+  for (const auto& [slots, yielding] :
+       {std::pair{2u, false}, std::pair{4u, false}, std::pair{2u, true}, std::pair{4u, true}}) {
     Memory memory(slots);
     std::atomic<bool> stop{false};
-    std::thread writing([&] {
+    std::thread writing([&memory, &stop, yields = yielding] {
       StreamWriter writer(memory.ring());
-      while (!stop.load(std::memory_order_relaxed)) {
-        const std::uint64_t number = writer.published() + 1;
+      std::uint64_t stores = 0;
+      for (std::uint64_t number = 1; !stop.load(std::memory_order_relaxed); ++number) {
         const Payload payload = PayloadOf(number);
-        writer.Publish(std::span(payload).first(LengthOf(number)),
-                       static_cast<std::uint32_t>(number ^ 5), number + 7);
+        const auto used = std::span(payload).first(LengthOf(number));
+        const auto blocks = static_cast<std::uint32_t>(number ^ 5);
+        if (yields) {
+          PublishStores(memory.ring(), number, used, blocks, number + 7, YieldingStore{&stores});
+        } else {
+          writer.Publish(used, blocks, number + 7);
+        }
       }
     });
     std::map<ReadStatus, std::uint64_t> latest_count;
     std::map<ReadStatus, std::uint64_t> next_count;
     std::uint64_t torn = 0;
     std::uint64_t disordered = 0;
-    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(700);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(400);
+    const auto watchdog = end + std::chrono::seconds(20);
     StreamReader latest(memory.ring());
     StreamReader next(memory.ring());
     std::uint64_t last_latest = 0;
     std::uint64_t last_next = 0;
-    while (std::chrono::steady_clock::now() < end) {
+    const auto done = [&] {
+      const auto now = std::chrono::steady_clock::now();
+      return (now > end && latest_count[kFresh] > 100) || now > watchdog;
+    };
+    while (!done()) {
       for (int i = 0; i < 100; ++i) {
         Payload payload{};
         Received received;
@@ -393,13 +391,14 @@ TEST_CASE("two threads at full speed: nothing torn, nothing backwards, seldom co
           disordered += received.number > last_next ? 0 : 1;
           last_next = received.number;
         }
+        if (status == ReadStatus::kEmpty) std::this_thread::yield();
       }
     }
     stop = true;
     writing.join();
-    INFO("slots " << slots << ": fresh " << latest_count[kFresh] << ", contended "
-                  << latest_count[ReadStatus::kContended] << ", next fresh " << next_count[kFresh]
-                  << ", contended " << next_count[ReadStatus::kContended]);
+    INFO("slots " << slots << ", yielding " << yielding << ": fresh " << latest_count[kFresh]
+                  << ", contended " << latest_count[ReadStatus::kContended] << ", next fresh "
+                  << next_count[kFresh] << ", contended " << next_count[ReadStatus::kContended]);
     CHECK(torn == 0);
     CHECK(disordered == 0);
     CHECK(latest_count[ReadStatus::kRejected] + next_count[ReadStatus::kRejected] == 0);
@@ -408,55 +407,6 @@ TEST_CASE("two threads at full speed: nothing torn, nothing backwards, seldom co
     // Publishing before writing would show here: it makes nine reads of ten fail.
     if (slots == 4) CHECK(latest_count[ReadStatus::kContended] < latest_count[kFresh]);
   }
-}
-
-TEST_CASE("publishing and reading messages allocates nothing") {
-  Memory memory(4, 128 * ((kHapticTickBytes + 32 + 127) / 128));
-  MessageWriter<HapticTick> writer{StreamWriter(memory.ring())};
-  MessageReader<HapticTick> reader{StreamReader(memory.ring())};
-  test::Generator generator(1);
-  std::vector<HapticTick> ticks;
-  for (int i = 0; i < 100; ++i) ticks.push_back(generator.Tick());
-  HapticTick got;
-  bool right = true;
-  const std::uint64_t before = allocations.load();
-  for (const HapticTick& tick : ticks) {
-    right = right && writer.Publish(tick, 1);
-    right = right && reader.ReadNext(got) == kFresh && got.tick == tick.tick;
-    right = right && reader.ReadLatest(got) == ReadStatus::kSame;
-  }
-  const std::uint64_t after = allocations.load();
-  CHECK(right);
-  CHECK(after == before);
-  std::vector<int> one(1);
-  CHECK(allocations.load() == after + 1);  // the counter counts
-}
-
-TEST_CASE("nonsense is rejected, counted, and ten in a row are hopeless") {
-  Memory memory(4, 128 * ((kHapticTickBytes + 32 + 127) / 128));
-  MessageWriter<HapticTick> writer{StreamWriter(memory.ring())};
-  MessageReader<HapticTick> reader{StreamReader(memory.ring())};
-  HapticTick sound;
-  sound.period_ns = 1;
-  HapticTick nonsense = sound;
-  nonsense.stiffness = -1;
-  HapticTick got;
-  for (int i = 0; i < 9; ++i) {
-    writer.Publish(nonsense, 1);
-    CHECK(reader.ReadLatest(got) == ReadStatus::kRejected);
-  }
-  CHECK_FALSE(reader.hopeless());
-  writer.Publish(sound, 1);
-  CHECK(reader.ReadLatest(got) == kFresh);
-  CHECK(reader.rejected() == 9);
-  for (int i = 0; i < 10; ++i) {
-    CHECK_FALSE(reader.hopeless());
-    writer.Publish(nonsense, 1);
-    CHECK(reader.ReadNext(got) == ReadStatus::kRejected);
-  }
-  CHECK(reader.hopeless());
-  CHECK(reader.refusal() == DecodeStatus::kRange);
-  CHECK(got.stiffness == 0);
 }
 
 }  // namespace
