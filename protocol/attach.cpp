@@ -59,16 +59,17 @@ std::string CheckEntry(const StreamEntry& entry, std::uint64_t segment_bytes,
   if (entry.ring_offset % kLineBytes != 0 || !inside(entry.ring_offset, ring_bytes)) {
     return "ring_offset is not an aligned place inside the segment";
   }
-  for (const Extent extent : {Extent{entry.cursor_offset, entry.cursor_offset + kLineBytes},
-                              Extent{entry.ring_offset, entry.ring_offset + ring_bytes}}) {
-    for (const Extent& other : extents) {
-      if (extent.begin < other.end && other.begin < extent.end) {
-        return extent.begin == entry.cursor_offset ? "cursor_offset overlaps another stream"
-                                                   : "ring_offset overlaps another stream";
-      }
-    }
-    extents.push_back(extent);
-  }
+  const Extent cursor{entry.cursor_offset, entry.cursor_offset + kLineBytes};
+  const Extent ring{entry.ring_offset, entry.ring_offset + ring_bytes};
+  const auto taken = [&extents](const Extent& extent) {
+    return std::any_of(extents.begin(), extents.end(), [&extent](const Extent& other) {
+      return extent.begin < other.end && other.begin < extent.end;
+    });
+  };
+  if (taken(cursor)) return "cursor_offset overlaps another stream";
+  extents.push_back(cursor);
+  if (taken(ring)) return "ring_offset overlaps a counter or another stream";
+  extents.push_back(ring);
   return {};
 }
 

@@ -10,6 +10,8 @@ std::uint64_t Load(std::uint64_t& word, std::memory_order order) noexcept {
 }
 
 constexpr int kTries = 3;
+// Twice a number must fit into a word: 292 million years at 1 kHz.
+constexpr std::uint64_t kEndOfNumbers = 1ULL << 63;
 // ReadNext keeps this far from the slot that the writer fills next.
 constexpr std::uint64_t kGuard = 2;
 
@@ -56,7 +58,7 @@ ReadStatus StreamReader::ReadLatest(std::span<std::uint64_t> payload, Received& 
   for (int i = 0; i < kTries; ++i) {
     // SYNC: published. The message with this number is whole.
     const std::uint64_t newest = Load(*ring_.published, std::memory_order_acquire);
-    if (newest < cursor_) return ReadStatus::kBackwards;
+    if (newest < cursor_ || newest >= kEndOfNumbers) return ReadStatus::kBackwards;
     if (newest == 0) return ReadStatus::kEmpty;
     if (newest == cursor_) return ReadStatus::kSame;
     if (Copy(newest, payload, received)) return Return(received);
@@ -70,7 +72,7 @@ ReadStatus StreamReader::ReadNext(std::span<std::uint64_t> payload, Received& re
   for (int i = 0; i < kTries; ++i) {
     // SYNC: published. Every message up to this number was whole when it was published.
     const std::uint64_t newest = Load(*ring_.published, std::memory_order_acquire);
-    if (newest < cursor_) return ReadStatus::kBackwards;
+    if (newest < cursor_ || newest >= kEndOfNumbers) return ReadStatus::kBackwards;
     if (newest == cursor_) return ReadStatus::kEmpty;
     if (newest - cursor_ > ring_.slot_count - kGuard) {
       const std::uint64_t resumed = newest - ring_.slot_count / 2;

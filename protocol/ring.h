@@ -104,7 +104,7 @@ enum class ReadStatus : std::uint32_t {
   kSame,       // ReadLatest: the newest is the one returned last
   kEmpty,      // nothing (more) was published
   kContended,  // overwritten while being copied, three times: keep the previous value
-  kBackwards,  // the counter went back: the writer breaks the protocol, detach
+  kBackwards,  // the counter went back, or cannot be: the writer breaks the protocol
   kRejected,   // the message is nonsense (its lengths, or what it says): keep the previous value
 };
 
