@@ -43,11 +43,8 @@ void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_
   previous_start_ns_ = now_ns;
   PublishTick();
 
-  ++loop_health_.lateness[HistogramBucket(now_ns - deadline_ns)];
-  ++loop_health_.duration[HistogramBucket(MonotonicNow() - now_ns)];
-  loop_health_.missed += static_cast<std::uint64_t>(missed);
-  loop_health_.worst_missed_in_a_row =
-      std::max(loop_health_.worst_missed_in_a_row, static_cast<std::uint64_t>(missed));
+  ++lateness_[HistogramBucket(now_ns - deadline_ns)];
+  ++duration_[HistogramBucket(MonotonicNow() - now_ns)];
   if (performed_++ % health_every_ == 0) PublishHealth();
 }
 
@@ -78,21 +75,14 @@ void HapticLoop::PublishTick() noexcept {
   const auto now_ns = static_cast<std::uint64_t>(MonotonicNow());
   ticks_.Publish(tick_, now_ns);
   owner_.Heartbeat(tick_.tick, now_ns);
-  const protocol::HapticHealth& health = step_.health();
-  status_.reason.store(health.reason, std::memory_order_relaxed);
-  status_.peer.store(health.peer_state, std::memory_order_relaxed);
-  status_.missed.store(loop_health_.missed, std::memory_order_relaxed);
+  reason_.store(step_.health().reason, std::memory_order_relaxed);
 }
 
 void HapticLoop::PublishHealth() noexcept {
   health_ = step_.health();
   if (link_.incompatible()) health_.peer_state = protocol::PeerState::kIncompatible;
-  health_.ticks = performed_;
-  health_.period_ns = static_cast<std::uint64_t>(period_ns_);
-  health_.missed = loop_health_.missed;
-  health_.worst_missed_in_a_row = loop_health_.worst_missed_in_a_row;
-  health_.lateness = loop_health_.lateness;
-  health_.duration = loop_health_.duration;
+  health_.lateness = lateness_;
+  health_.duration = duration_;
   health_.scheduling = scheduling_;
   rusage usage{};
   getrusage(RUSAGE_THREAD, &usage);

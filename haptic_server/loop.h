@@ -1,6 +1,6 @@
 // The haptic loop around its step: wakes at the haptic rate, reads the newest world frame, runs the tick,
 // publishes it. The thread that runs it may be real-time, so nothing below allocates, locks, logs or
-// throws; what is worth a line is left in `status` for the supervisor.
+// throws.
 #pragma once
 
 #include <atomic>
@@ -13,13 +13,6 @@
 #include "protocol/stream.h"
 
 namespace rikiseki::haptic {
-
-/// What the supervisor may look at while the loop runs.
-struct LoopStatus {
-  std::atomic<protocol::ForceReason> reason{protocol::ForceReason::kWorldAbsent};
-  std::atomic<protocol::PeerState> peer{protocol::PeerState::kAbsent};
-  std::atomic<std::uint64_t> missed{0};
-};
 
 class HapticLoop {
  public:
@@ -39,7 +32,8 @@ class HapticLoop {
   /// The last tick: the device is let go. // RT:
   void Stop() noexcept;
 
-  const LoopStatus& status() const { return status_; }
+  /// Why the force is what it is; for the supervisor, from any thread.
+  protocol::ForceReason reason() const noexcept { return reason_.load(std::memory_order_relaxed); }
 
  private:
   WorldInput ReadWorld() noexcept;
@@ -59,9 +53,10 @@ class HapticLoop {
   protocol::HapticTick tick_;
   protocol::WorldFrame frame_;
   protocol::HapticHealth health_;
-  protocol::HapticHealth loop_health_;  // what the step does not know
+  protocol::Histogram lateness_{};
+  protocol::Histogram duration_{};
   protocol::Scheduling scheduling_;
-  LoopStatus status_;
+  std::atomic<protocol::ForceReason> reason_{protocol::ForceReason::kWorldAbsent};
   std::int64_t previous_start_ns_ = 0;
   std::uint64_t performed_ = 0;
 };

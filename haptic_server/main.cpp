@@ -12,8 +12,7 @@
 #include "common/version.h"
 #include "haptic_server/device/spidar.h"
 #include "haptic_server/loop.h"
-#include "haptic_server/safety/reason_text.h"
-#include "protocol/codec.h"
+#include "protocol/describe.h"
 
 namespace {
 
@@ -48,24 +47,23 @@ protocol::Scheduling JudgeRealtime(const Settings& settings, const RealtimeObtai
           .cpu = static_cast<std::uint32_t>(obtained.cpu)};
 }
 
+// Contact, its limits and its absence: what happens all the time and is not worth a line.
+bool IsRendering(protocol::ForceReason reason) {
+  return reason <= protocol::ForceReason::kSoftStart;
+}
+
 // Logs what changed, for the tick may not; ends on SIGINT or SIGTERM.
 void Supervise(const HapticLoop& loop, protocol::PeerLink& link) {
-  protocol::ForceReason reason = loop.status().reason;
-  std::uint64_t missed = 0;
+  protocol::ForceReason logged = protocol::ForceReason::kNoContact;
   while (true) {
     const int signal = WaitForSignal(kSupervisorPollMs);
     if (signal == SIGINT || signal == SIGTERM) return;
     if (signal == SIGHUP) spdlog::info("SIGHUP: haptic_server takes changed settings at a restart");
     for (const std::string& line : link.PollNews()) spdlog::info("world: {}", line);
-    const protocol::ForceReason now = loop.status().reason;
-    if (IsNoteworthy(now) != IsNoteworthy(reason) || (IsNoteworthy(now) && now != reason)) {
-      spdlog::info("force: {}", protocol::Describe(now));
-    }
-    reason = now;
-    if (const std::uint64_t count = loop.status().missed; count != missed) {
-      spdlog::debug("deadlines missed: {}", count - missed);
-      missed = count;
-    }
+    const protocol::ForceReason reason = loop.reason();
+    if (IsRendering(reason) && IsRendering(logged)) continue;
+    if (reason != logged) spdlog::info("force: {}", protocol::Describe(reason));
+    logged = reason;
   }
 }
 
