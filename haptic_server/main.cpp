@@ -125,5 +125,11 @@ int Run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return RunProgram("haptic_server", [&] { return Run(argc, argv); });
+  return RunProgram("haptic_server", [&] {
+    try {
+      return Run(argc, argv);
+    } catch (const protocol::SegmentError& error) {
+      throw StartError(error.exit_code(), error.what());
+    }
+  });
 }

@@ -101,5 +101,11 @@ int Run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return RunProgram("world_server", [&] { return Run(argc, argv); });
+  return RunProgram("world_server", [&] {
+    try {
+      return Run(argc, argv);
+    } catch (const protocol::SegmentError& error) {
+      throw StartError(error.exit_code(), error.what());
+    }
+  });
 }

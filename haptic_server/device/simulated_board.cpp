@@ -15,10 +15,12 @@ MotorProgram::Script PushScript(const HandSettings& hand) {
   MotorProgram::Script script;
   script.home = home;
   if (hand.script == HandScript::kPush) {
-    script.strokes = {
-        {reach, hand.reach_ms * 1e-3}, {reach, hand.hold_ms * 1e-3}, {home, hand.return_ms * 1e-3}};
+    // The rest comes first: a world that starts beside us is live before the first push.
+    script.strokes = {{home, hand.rest_ms * 1e-3},
+                      {reach, hand.reach_ms * 1e-3},
+                      {reach, hand.hold_ms * 1e-3},
+                      {home, hand.return_ms * 1e-3}};
     script.repeats = true;
-    script.rest_s = hand.rest_ms * 1e-3;
     script.rest_jitter_s = hand.rest_jitter_ms * 1e-3;
     script.seed = static_cast<std::uint64_t>(hand.seed);
   }

@@ -11,6 +11,24 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// What the channels of `now` grew by since `before`: one that was not there counts from zero.
+protocol::ImpulseUnits Growth(const protocol::HapticTick& now, const protocol::HapticTick& before) {
+  protocol::ImpulseUnits growth{};
+  for (std::uint32_t i = 0; i < now.channel_count; ++i) {
+    const protocol::Channel& channel = now.channels[i];
+    protocol::ImpulseUnits earlier{};
+    for (std::uint32_t j = 0; j < before.channel_count; ++j) {
+      const protocol::Channel& other = before.channels[j];
+      if (other.body == channel.body && other.generation == channel.generation &&
+          other.pointer == channel.pointer && other.opened_tick == channel.opened_tick) {
+        earlier = other.impulse;
+      }
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) growth[axis] += channel.impulse[axis] - earlier[axis];
+  }
+  return growth;
+}
+
 template <typename Message>
 Message ReadNewest(const protocol::PeerView& view) {
   auto reader = view.Reader<Message>();
@@ -57,7 +75,9 @@ TickWatch::~TickWatch() {
 void TickWatch::Run() {
   auto reader = view_->Reader<protocol::HapticTick>();
   protocol::HapticTick tick;
+  protocol::HapticTick tick_before;
   protocol::Vector before{};
+  protocol::ImpulseUnits displayed{};
   std::uint64_t number_before = 0;
   while (!stop_) {
     const protocol::ReadStatus status = reader.ReadNext(tick);
@@ -78,6 +98,9 @@ void TickWatch::Run() {
     }
     number_before = reader.received().number;
     before = force;
+    const protocol::ImpulseUnits growth = Growth(tick, tick_before);
+    for (std::size_t axis = 0; axis < 3; ++axis) displayed[axis] += growth[axis];
+    tick_before = tick;
     const std::lock_guard lock(mutex_);
     ticks_.push_back({.tick = tick.tick,
                       .start_ns = tick.start_ns,
@@ -85,7 +108,8 @@ void TickWatch::Run() {
                       .force = magnitude,
                       .force_x = force[0],
                       .finger_x = tick.pointers[0].position[0],
-                      .reason = tick.pointers[0].reason});
+                      .reason = tick.pointers[0].reason,
+                      .displayed = displayed});
   }
 }
 

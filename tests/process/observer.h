@@ -32,6 +32,7 @@ struct WatchedTick {
   double force_x = 0;
   double finger_x = 0;  // m
   protocol::ForceReason reason{};
+  protocol::ImpulseUnits displayed{};  // growth of all channels since the watch began
 };
 
 /// Reads every tick of one haptic epoch on a thread of its own.

@@ -20,6 +20,8 @@ using protocol::PeerState;
 using protocol::Role;
 
 constexpr double kSlewLimit = 5000;  // N/s, set below, whatever the shipped file says
+// The strings' tensions add up to zero but for rounding: 4 * 20 N * 2^-53 and some.
+constexpr double kZeroForce = 1e-12;  // N
 constexpr double kUnit = protocol::kImpulseUnit;
 
 std::vector<std::string> HapticCommand(const std::string& instance) {
@@ -76,7 +78,7 @@ std::optional<std::uint64_t> TimeToZero(const std::vector<WatchedTick>& ticks,
   for (const WatchedTick& tick : ticks) {
     if (tick.world_frame == last_frame && !silent_since) silent_since = tick.start_ns;
     if (tick.world_frame != last_frame && silent_since && tick.world_frame != 0) return std::nullopt;
-    if (silent_since && tick.force == 0 && tick.reason != ForceReason::kNoContact) {
+    if (silent_since && tick.force < kZeroForce && tick.reason != ForceReason::kNoContact) {
       return tick.start_ns - *silent_since;
     }
   }
@@ -150,16 +152,14 @@ TEST_CASE("a world killed in contact: the force goes to zero in the stated time,
   const std::uint64_t bound_ns = ReadHapticHealth(*haptic_view).zero_force_after_ns;
   std::this_thread::sleep_for(std::chrono::nanoseconds(bound_ns));
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
-  const std::uint64_t last_frame = watch.Latest().world_frame;
   std::uint64_t frame_at_kill = 0;
   for (const WatchedTick& tick : watch.All()) frame_at_kill = std::max(frame_at_kill, tick.world_frame);
   const auto to_zero_ns = TimeToZero(watch.All(), frame_at_kill);
   REQUIRE(to_zero_ns);
   CHECK(*to_zero_ns <= bound_ns);
   CHECK(bound_ns <= 600'000'000);
-  CHECK(watch.Latest().force == 0);
+  CHECK(watch.Latest().force < kZeroForce);
   CHECK(haptic.IsRunning());
-  (void)last_frame;
 
   Child second(WorldCommand(instance));
   const auto world_view = Observe(instance, Role::kWorld);
@@ -176,7 +176,6 @@ TEST_CASE("a haptic side killed in contact: the world goes on, applies what was 
   const std::string instance = FreshInstance();
   Child world(WorldCommand(instance));
   const auto world_view = Observe(instance, Role::kWorld);
-  protocol::ImpulseUnits published{};
   protocol::WorldFrame frame;
   {
     Child haptic(HapticCommand(instance));
@@ -188,15 +187,13 @@ TEST_CASE("a haptic side killed in contact: the world goes on, applies what was 
     auto reader = haptic_view->Reader<protocol::HapticTick>();
     protocol::HapticTick last;
     REQUIRE(reader.ReadLatest(last) == protocol::ReadStatus::kFresh);
-    for (std::uint32_t i = 0; i < last.channel_count; ++i) {
-      published = Sum(published, last.channels[i].impulse);
-    }
     // The last message of the dead process is still taken: delivered = applied + discarded.
     REQUIRE(Eventually([&] {
       frame = ReadWorldFrame(*world_view);
       return frame.acked_epoch == haptic_view->epoch() && frame.acked_tick == last.tick;
     }));
-    CHECK(Sum(frame.applied, frame.discarded) == published);
+    REQUIRE(Eventually([&] { return watch.Latest().tick == last.tick; }));
+    CHECK(Sum(frame.applied, frame.discarded) == watch.Latest().displayed);
     CheckSafe(watch);
   }
   const std::uint64_t frames = ReadWorldHealth(*world_view).frames;
@@ -230,7 +227,7 @@ TEST_CASE("a world that sleeps in contact: zero force meanwhile, no kick and no 
   const auto to_zero_ns = TimeToZero(watch.All(), frame_at_stop);
   REQUIRE(to_zero_ns);
   CHECK(*to_zero_ns <= bound_ns);
-  CHECK(watch.Latest().force == 0);
+  CHECK(watch.Latest().force < kZeroForce);
   const double momentum_before = Norm(ReadWorldHealth(*world_view).applied);
 
   world.Signal(SIGCONT);

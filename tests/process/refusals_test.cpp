@@ -104,7 +104,7 @@ TEST_CASE("an SDF that names no world, and one with a shape of nonsense size") {
                                "</world></sdf>\n");
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", negative.path()}),
-               {negative.path(), "size"});
+               {negative.path() + ":4", "box", "above 0"});
 }
 
 TEST_CASE("a coupling that is not built names those that are") {
