@@ -57,7 +57,7 @@ TEST_CASE("bodies come back as they were sent") {
     std::uint32_t count = 99;
     REQUIRE(Decode(words, encoded, got, count) == DecodeStatus::kOk);
     REQUIRE(count == size);
-    CHECK(std::memcmp(got.data(), bodies.data(), size * sizeof(Body)) == 0);
+    if (size > 0) CHECK(std::memcmp(got.data(), bodies.data(), size * sizeof(Body)) == 0);
   }
 }
 

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <iomanip>
 #include <iterator>
+#include <map>
+#include <regex>
+#include <sstream>
 #include <string>
 
 #include "protocol/version.h"
@@ -22,10 +26,13 @@ std::string Layout() {
   return collector.text;
 }
 
+std::string ReadFile(const std::string& path) {
+  std::ifstream file(RIKISEKI_SOURCE_DIR "/" + path);
+  return std::string((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+}
+
 TEST_CASE("the layout is the golden one") {
-  std::ifstream file(RIKISEKI_SOURCE_DIR "/protocol/layout.golden.txt");
-  const std::string golden((std::istreambuf_iterator<char>(file)),
-                           std::istreambuf_iterator<char>());
+  const std::string golden = ReadFile("protocol/layout.golden.txt");
   REQUIRE(!golden.empty());
   CHECK(Layout() == golden);
 }
@@ -39,6 +46,43 @@ TEST_CASE("the hash is FNV-1a-64 of the golden text") {
   LayoutHasher ours;
   for (const char c : Layout()) ours(c);
   CHECK(ours.hash() == kLayoutHash);
+}
+
+TEST_CASE("the tables of SPEC.md are the layout") {
+  std::istringstream spec(ReadFile("protocol/SPEC.md"));
+  std::string record;
+  std::map<std::string, std::string> rows;  // by record: the page has its own order
+  for (std::string line; std::getline(spec, line);) {
+    std::smatch match;
+    if (std::regex_match(line, match, std::regex("Record `([^`]+)`, ([0-9]+) bytes:"))) {
+      record = match[1];
+    } else if (line.rfind("#", 0) == 0) {
+      record.clear();  // the tables of sections 3 and 4 have no such headline
+    } else if (!record.empty() &&
+               std::regex_match(line, match,
+                                std::regex("\\| ([0-9]+) \\| (\\S+) \\| (\\S+) \\|.*"))) {
+      rows[record] += match[3].str() + ":" + match[2].str() + ":" + match[1].str() + "\n";
+    }
+  }
+  // The layout's lines of messages, without the sizes, which follow from the types.
+  std::map<std::string, std::string> expected;
+  std::istringstream layout(Layout());
+  for (std::string line; std::getline(layout, line);) {
+    std::smatch match;
+    if (std::regex_match(line, match,
+                         std::regex("((haptic|world)\\.[a-z]+(/[a-z_]+)?)\\.(.*):[0-9]+"))) {
+      expected[match[1]] += match[4].str() + "\n";
+    }
+  }
+  CHECK(expected.size() == 12);
+  CHECK(rows == expected);
+}
+
+TEST_CASE("SPEC.md and CHANGELOG.md name the hash") {
+  std::ostringstream hash;
+  hash << std::hex << std::setfill('0') << std::setw(16) << kLayoutHash;
+  CHECK_THAT(ReadFile("protocol/SPEC.md"), Catch::Contains(hash.str()));
+  CHECK_THAT(ReadFile("protocol/CHANGELOG.md"), Catch::Contains(hash.str()));
 }
 
 TEST_CASE("every line of the layout continues where the one before ended") {

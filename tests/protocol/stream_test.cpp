@@ -13,13 +13,15 @@ std::atomic<std::uint64_t> allocations{0};
 }  // namespace
 
 // Counts every allocation of this test program. Not inlined, so that the compiler sees matching
-// pairs. ThreadSanitizer brings its own operators and lets nobody else have them.
-#if defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-#define RIKISEKI_THREAD_SANITIZER
+// pairs. The sanitizers bring their own operators and do not like others.
+#if defined(__SANITIZE_ADDRESS__)
+#define RIKISEKI_SANITIZED
+#elif defined(__has_feature)
+#if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
+#define RIKISEKI_SANITIZED
 #endif
 #endif
-#ifndef RIKISEKI_THREAD_SANITIZER
+#ifndef RIKISEKI_SANITIZED
 [[gnu::noinline]] void* operator new(std::size_t bytes) {
   allocations.fetch_add(1, std::memory_order_relaxed);
   if (void* memory = std::malloc(bytes != 0 ? bytes : 1)) return memory;
@@ -66,7 +68,7 @@ TEST_CASE("publishing and reading messages allocates nothing") {
   CHECK(right);
   CHECK(after == before);
   std::vector<int> one(1);
-#ifndef RIKISEKI_THREAD_SANITIZER
+#ifndef RIKISEKI_SANITIZED
   CHECK(allocations.load() == after + 1);  // the counter counts
 #endif
 }
