@@ -1,5 +1,5 @@
-// The simulated hand: where it wants to be (a motor program over time) and how it yields to force (a
-// mass-damper-spring about that target). numerics 5; reference scenarios P and H.
+// The simulated hand: where it wants to be (a motor program over time) and how it yields to force
+// (a mass-damper-spring about that target). numerics 5; reference scenarios P and H.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,9 @@ struct Stroke {
   double duration_s = 0;
 };
 
-/// C_d(t): strokes one after the other from `home`, then a rest of `rest_s` plus a random part uniform in
-/// 0..`rest_jitter_s`; then from the start again if `repeats`, else it stays where the strokes ended.
+/// C_d(t): strokes one after the other from `home`, then a rest of `rest_s` plus a random part
+/// uniform in 0..`rest_jitter_s`; then from the start again if `repeats`, else it stays where the
+/// strokes ended.
 class MotorProgram {
  public:
   struct Script {
@@ -69,16 +70,16 @@ class Hand {
  public:
   using Program = std::function<Vec3(double t_s)>;
 
-  /// Starts at time 0 at rest on the program. Throws std::invalid_argument unless the mass is positive
-  /// and damping and stiffness are not negative.
+  /// Starts at time 0 at rest on the program. Throws std::invalid_argument unless the mass is
+  /// positive and damping and stiffness are not negative.
   Hand(Program program, const Impedance& impedance);
 
   /// Moves on by `dt_ns` under `force` [N, on the hand], held for that time. // RT:
   void Advance(std::int64_t dt_ns, const Vec3& force) noexcept;
 
   std::int64_t now_ns() const noexcept { return now_ns_; }
-  const Vec3& target() const noexcept { return target_; }            // m, C_d
-  Vec3 position() const noexcept { return target_ + yielding_; }     // m, C = C_d + y
+  const Vec3& target() const noexcept { return target_; }               // m, C_d
+  Vec3 position() const noexcept { return target_ + yielding_; }        // m, C = C_d + y
   const Vec3& yielding_velocity() const noexcept { return velocity_; }  // m/s, y'
 
  private:

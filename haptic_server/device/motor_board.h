@@ -1,5 +1,5 @@
-// The electronics of a SPIDAR: motors that pull with a commanded tension and encoders that count string.
-// Behind it stand the simulated board and, with the USB drivers, the real ones.
+// The electronics of a SPIDAR: motors that pull with a commanded tension and encoders that count
+// string. Behind it stand the simulated board and, with the USB drivers, the real ones.
 #pragma once
 
 #include <array>

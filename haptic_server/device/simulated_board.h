@@ -1,5 +1,5 @@
-// A motor board that is not there, with the physics behind it: four strings, their encoders, and the
-// grip as one body with the simulated hand that holds it.
+// A motor board that is not there, with the physics behind it: four strings, their encoders, and
+// the grip as one body with the simulated hand that holds it.
 #pragma once
 
 #include "haptic_server/device/hand.h"
@@ -12,9 +12,9 @@ namespace rikiseki::haptic {
 /// The hand of the settings as it holds the device of the settings: masses and dampings added.
 Hand MakeHand(const Settings& settings);
 
-/// The body moves only when the encoders are read: up to that instant, under the tensions written last,
-/// whose directions are taken anew at least every millisecond. Lengths are rounded to whole counts and
-/// tensions clamped, as hardware would.
+/// The body moves only when the encoders are read: up to that instant, under the tensions written
+/// last, whose directions are taken anew at least every millisecond. Lengths are rounded to whole
+/// counts and tensions clamped, as hardware would.
 class SimulatedBoard final : public MotorBoard {
  public:
   SimulatedBoard(const SpidarSettings& spidar, Hand hand);

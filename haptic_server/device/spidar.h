@@ -1,5 +1,5 @@
-// A 4-string SPIDAR as a force display: counts -> lengths -> position, force -> tensions, over a motor
-// board. Watches that the strings agree with each other: a slack or slipped one is a fault.
+// A 4-string SPIDAR as a force display: counts -> lengths -> position, force -> tensions, over a
+// motor board. Watches that the strings agree with each other: a slack or slipped one is a fault.
 #pragma once
 
 #include <memory>
@@ -11,8 +11,8 @@
 
 namespace rikiseki::haptic {
 
-/// Four strings fix a point with one length to spare; if that one is off by more than this [m], a string
-/// hangs slack or its pulley slipped. Quantisation accounts for less than one count.
+/// Four strings fix a point with one length to spare; if that one is off by more than this [m], a
+/// string hangs slack or its pulley slipped. Quantisation accounts for less than one count.
 inline constexpr double kSlipResidual = 1e-3;
 
 class Spidar final : public Device {

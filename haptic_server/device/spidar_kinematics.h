@@ -18,11 +18,12 @@ class SpidarKinematics {
  public:
   struct Fix {
     Vec3 position = Vec3::Zero();  // m, device axes
-    double residual_m = 0;         // largest length that this position leaves unexplained: slack or slip
+    double residual_m = 0;  // largest length that this position leaves unexplained: slack or slip
     int iterations = 0;
   };
 
-  /// `motors` [m, device axes]: 4 to 8 string exits, not all in one plane. Throws std::invalid_argument.
+  /// `motors` [m, device axes]: 4 to 8 string exits, not all in one plane. Throws
+  /// std::invalid_argument.
   explicit SpidarKinematics(const std::vector<Vec3>& motors);
 
   std::size_t StringCount() const noexcept { return count_; }
@@ -31,9 +32,10 @@ class SpidarKinematics {
   /// The string lengths [m] of a grip position. // RT:
   PerString Lengths(const Vec3& position) const noexcept;
 
-  /// The position that explains the lengths best (least squares). The differences of squared lengths are
-  /// linear in the position, which gives a start from anywhere that is exact for consistent lengths; at
-  /// most 3 Gauss-Newton steps then spread what quantisation left. Has no memory. // RT:
+  /// The position that explains the lengths best (least squares). The differences of squared
+  /// lengths are linear in the position, which gives a start from anywhere that is exact for
+  /// consistent lengths; at most 3 Gauss-Newton steps then spread what quantisation left. Has no
+  /// memory. // RT:
   Fix Solve(const PerString& lengths) const noexcept;
 
  private:

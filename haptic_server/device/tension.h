@@ -25,10 +25,10 @@ struct TensionAllocation {
 Vec3 StringForce(const std::array<Vec3, kTensionStrings>& directions,
                  const FourStrings& tension) noexcept;
 
-/// Of all tensions within the bounds that display `force` [N], those of the smallest sum; if there are
-/// none, those that miss it least, again of the smallest sum. Exact: four tensions balance three
-/// components, so the solutions form a line; outside, the best point lies on a face of the box, and all
-/// faces are tried. A force that is not finite counts as zero. // RT:
+/// Of all tensions within the bounds that display `force` [N], those of the smallest sum; if there
+/// are none, those that miss it least, again of the smallest sum. Exact: four tensions balance
+/// three components, so the solutions form a line; outside, the best point lies on a face of the
+/// box, and all faces are tried. A force that is not finite counts as zero. // RT:
 TensionAllocation AllocateTensions(const std::array<Vec3, kTensionStrings>& directions,
                                    const Vec3& force, const TensionBounds& bounds) noexcept;
 

@@ -1,5 +1,5 @@
-// What the world sent becomes what is shown: features keep their identity from frame to frame and move
-// between frames by the display rule. Paper 3.1 and 3.2; numerics 1.
+// What the world sent becomes what is shown: features keep their identity from frame to frame and
+// move between frames by the display rule. Paper 3.1 and 3.2; numerics 1.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@
 
 namespace rikiseki::haptic {
 
-/// A feature that appears with the finger already inside it starts below the finger and rises to its
-/// place within this time [s], so that the force does not step (Mark 1996: recovery time).
+/// A feature that appears with the finger already inside it starts below the finger and rises to
+/// its place within this time [s], so that the force does not step (Mark 1996: recovery time).
 inline constexpr double kRecoveryTime = 0.1;
 
 /// Coordinates beyond this [m] are taken for damage, not for places.
@@ -63,7 +63,7 @@ class FeatureTrack {
     protocol::Plane identity;  // and own stiffness
     Vec3 previous_point, last_point;
     Vec3 previous_normal, last_normal;
-    double recovery = 0;  // m, how far below its place it started
+    double recovery = 0;       // m, how far below its place it started
     double recovery_left = 0;  // 1..0
   };
 

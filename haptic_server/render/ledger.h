@@ -1,6 +1,6 @@
-// The books of the impulse: what was really displayed, to which body it belongs, and what the worlds
-// have acknowledged of it. All sums are integers of 1e-12 N s, so they balance exactly. SPEC.md section
-// 7; numerics 1.
+// The books of the impulse: what was really displayed, to which body it belongs, and what the
+// worlds have acknowledged of it. All sums are integers of 1e-12 N s, so they balance exactly.
+// SPEC.md section 7; numerics 1.
 #pragma once
 
 #include <array>
@@ -30,18 +30,18 @@ class ImpulseQuantizer {
   Vec3 remainder_ = Vec3::Zero();  // in units, |.| <= 0.5
 };
 
-/// Tick k books q_k = quantise(F_k T + F_(k-1) (dt_(k-1) - T)), F on the bodies: totals run to t_k + T and
-/// telescope to the sum of F_i dt_i with the true dt.
+/// Tick k books q_k = quantise(F_k T + F_(k-1) (dt_(k-1) - T)), F on the bodies: totals run to t_k
+/// + T and telescope to the sum of F_i dt_i with the true dt.
 class Ledger {
  public:
-  /// Remembers the totals of `history_ticks` ticks, to look up what an ack covers. `own_epoch`: acks that
-  /// name another haptic epoch cover nothing; 0 = all count.
+  /// Remembers the totals of `history_ticks` ticks, to look up what an ack covers. `own_epoch`:
+  /// acks that name another haptic epoch cover nothing; 0 = all count.
   Ledger(std::int64_t period_ns, std::uint64_t history_ticks, std::uint64_t own_epoch);
 
-  /// A frame of world `world_epoch`: books what its ack covers and frees the channels whose closing it
-  /// has seen. The first ack of a new world sends all between the old world's last ack and the new one's
-  /// baseline to `peer_lost`. Acks from the future, from the past, or of ticks that are forgotten are
-  /// ignored. Before Book of the same tick. // RT:
+  /// A frame of world `world_epoch`: books what its ack covers and frees the channels whose closing
+  /// it has seen. The first ack of a new world sends all between the old world's last ack and the
+  /// new one's baseline to `peer_lost`. Acks from the future, from the past, or of ticks that are
+  /// forgotten are ignored. Before Book of the same tick. // RT:
   void Receive(std::uint64_t world_epoch, const protocol::WorldFrame& frame) noexcept;
 
   /// Another world is displayed from now on: frees all channels. // RT:
@@ -52,18 +52,17 @@ class Ledger {
   bool Open(std::uint32_t body, std::uint32_t generation, std::uint32_t pointer,
             std::uint64_t tick) noexcept;
 
-  /// What one finger displayed in tick `tick`.
+  /// What the finger displayed in a tick.
   struct Entry {
-    std::uint64_t tick = 0;
     std::int64_t previous_duration_ns = 0;  // true t_k - t_(k-1)
     std::uint32_t pointer = 0;
-    Vec3 displayed = Vec3::Zero();             // N, on the user
-    std::span<const BodyShare> wanted;         // each with an open channel
-    Vec3 finger = Vec3::Zero();                // m, centre: where the ground's part acts
+    Vec3 displayed = Vec3::Zero();      // N, on the user
+    std::span<const BodyShare> wanted;  // each with an open channel
+    Vec3 finger = Vec3::Zero();         // m, centre: where the ground's part acts
   };
 
-  /// Books a tick: body shares scaled by clip(displayed . wanted / |wanted|^2, 0, 1), the rest to the
-  /// ground. Every unit of the displayed force goes somewhere. Ticks come in order, without gaps. // RT:
+  /// Books the next tick, from 0: body shares scaled by clip(displayed . wanted / |wanted|^2, 0,
+  /// 1), the rest to the ground. Every unit of the displayed force goes somewhere. // RT:
   void Book(const Entry& entry) noexcept;
 
   /// Closes channels of `pointer` that are idle and whose body `is_near` does not know. // RT:
@@ -105,17 +104,19 @@ class Ledger {
   protocol::GroundChannel ground_;
   ImpulseQuantizer total_quantizer_;
   ImpulseQuantizer ground_angular_;
-  Vec3 total_force_ = Vec3::Zero();   // N, minus the displayed force of the tick before
+  Vec3 total_force_ = Vec3::Zero();  // N, minus the displayed force of the tick before
   Vec3 ground_force_ = Vec3::Zero();
   Vec3 ground_point_ = Vec3::Zero();
 
   protocol::Books books_;
-  std::vector<protocol::ImpulseUnits> history_;  // books_.displayed after tick k, at k modulo its size
-  std::uint64_t ticks_ = 0;                      // booked so far
+  std::vector<protocol::ImpulseUnits>
+      history_;              // books_.displayed after tick k, at k modulo its size
+  std::uint64_t ticks_ = 0;  // booked so far
 
   std::uint64_t world_epoch_ = 0;  // who acknowledged last
+  std::uint64_t world_baseline_ = 0;
   std::uint64_t acked_tick_ = 0;
-  protocol::ImpulseUnits acked_{};  // books_.displayed up to it
+  protocol::ImpulseUnits acked_{};                              // books_.displayed up to it
   protocol::ImpulseUnits world_applied_{}, world_discarded_{};  // as that world told them last
 };
 

@@ -24,16 +24,18 @@ struct BodyShare {
 
 inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
 
-/// The contact law of one pointer. For body b with e_b = sum of its multiplier_i * normal_i, so that the
-/// e_b add up to e = D - C:  f_b = sum of k_i multiplier_i normal_i + d_b (e_b - e_b of the tick before)/T.
-/// With equal k and d this is the paper's f = k e + d (e - e_before)/T, split without remainder. Without
-/// `adhesion` a body only pushes: f_b is dropped where f_b . e_b <= 0, and when the finger is free.
+/// The contact law of one pointer. For body b with e_b = sum of its multiplier_i * normal_i, so
+/// that the e_b add up to e = D - C:  f_b = sum of k_i multiplier_i normal_i + d_b (e_b - e_b of
+/// the tick before)/T. With equal k and d this is the paper's f = k e + d (e - e_before)/T, split
+/// without remainder. Without `adhesion` a body only pushes: f_b is dropped where f_b . e_b <= 0,
+/// and when the finger is free.
 class SurfaceForce {
  public:
   SurfaceForce(const RenderSettings& settings, double period_s);
 
-  /// `elapsed_ticks` is 1, or more after missed deadlines: the difference quotient runs over that many
-  /// *nominal* periods, so that jitter of the wake-up does not become jitter of the force. // RT:
+  /// `elapsed_ticks` is 1, or more after missed deadlines: the difference quotient runs over that
+  /// many *nominal* periods, so that jitter of the wake-up does not become jitter of the force. //
+  /// RT:
   std::span<const BodyShare> Update(std::span<const Surface> surfaces,
                                     const ContactSolution& contact, double radius,
                                     std::int64_t elapsed_ticks) noexcept;

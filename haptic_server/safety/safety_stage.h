@@ -1,5 +1,6 @@
-// The last stage before the device. It trusts nobody: whatever the stages before computed, the command
-// is finite, within the force cap, within the slew limit, and zero when there is no reason for a force.
+// The last stage before the device. It trusts nobody: whatever the stages before computed, the
+// command is finite, within the force cap, within the slew limit, and zero when there is no reason
+// for a force.
 #pragma once
 
 #include <cstdint>
@@ -22,10 +23,11 @@ struct SafetyInput {
   std::int64_t missed = 0;                // deadlines skipped in it
 };
 
-/// The force grows and fades by a gain in 0..1 on what was rendered: it rises over soft_start_ms while a
-/// world is live or late, falls over fade_ms when it is lost, and is 0 at once on a fault (device, finite
-/// check, over-speed, deadlines missed in a row), from where it rises again by itself. The slew limit acts
-/// on every change, at the nominal period, against what was displayed before: it is the last word.
+/// The force grows and fades by a gain in 0..1 on what was rendered: it rises over soft_start_ms
+/// while a world is live or late, falls over fade_ms when it is lost, and is 0 at once on a fault
+/// (device, finite check, over-speed, deadlines missed in a row), from where it rises again by
+/// itself. The slew limit acts on every change, at the nominal period, against what was displayed
+/// before: it is the last word.
 class SafetyStage {
  public:
   explicit SafetyStage(const Settings& settings);
@@ -47,6 +49,7 @@ class SafetyStage {
   void MoveGain(const SafetyInput& input, bool fault) noexcept;
 
   SafetySettings settings_;
+  double period_s_;
   double largest_step_n_;  // slew limit times nominal period
   std::int64_t fault_after_misses_;
   std::int64_t missed_in_a_row_ = 0;
@@ -56,8 +59,9 @@ class SafetyStage {
   protocol::ForceReason reason_ = protocol::ForceReason::kWorldAbsent;
 };
 
-/// The stated bound [ns]: from the last sign of a world of this period to zero force, whatever happens:
-/// lost + fade + cap/slew, and three ticks for noticing and for the last command to be held.
+/// The stated bound [ns]: from the last sign of a world of this period to zero force, whatever
+/// happens: lost + fade + cap/slew, and three ticks for noticing and for the last command to be
+/// held.
 std::int64_t ZeroForceAfter(const Settings& settings, std::int64_t world_period_ns) noexcept;
 
 }  // namespace rikiseki::haptic

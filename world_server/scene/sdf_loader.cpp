@@ -1,0 +1,377 @@
+#include "world_server/scene/sdf_loader.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <regex>
+#include <sdf/sdf.hh>
+#include <sstream>
+
+#include "common/config.h"
+#include "protocol/messages.h"
+#include "world_server/scene/sdf_survey.h"
+
+namespace rikiseki::world {
+namespace {
+
+// Stiffer than this no device renders: a file that says 1e12 means "rigid".
+constexpr double kLargestStiffness = 1e6;  // N/m
+constexpr double kLargestDamping = 1e4;    // N s/m
+
+// libsdformat and the URDF parser behind it write to std::cerr what their error objects do not
+// hold. Collects it, so that a refusal stays one line and still gives the reason.
+class CaptureStandardError {
+ public:
+  CaptureStandardError() : before_(std::cerr.rdbuf(text_.rdbuf())) {}
+  ~CaptureStandardError() { std::cerr.rdbuf(before_); }
+  CaptureStandardError(const CaptureStandardError&) = delete;
+  CaptureStandardError& operator=(const CaptureStandardError&) = delete;
+
+  // What libsdformat said at this level ("Error" or "Warning"), one entry for each message.
+  std::vector<std::string> Messages(const std::string& level) const {
+    const std::regex colour("\x1b\\[[0-9;]*m");
+    const std::regex prefix("^" + level + " \\[[^\\]]*\\]\\s*");
+    std::istringstream lines(text_.str());
+    std::vector<std::string> messages;
+    for (std::string line; std::getline(lines, line);) {
+      line = std::regex_replace(line, colour, "");
+      std::smatch match;
+      if (std::regex_search(line, match, prefix)) messages.push_back(match.suffix());
+    }
+    return messages;
+  }
+
+ private:
+  std::ostringstream text_;
+  std::streambuf* before_;
+};
+
+std::string OneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
+  return text;
+}
+
+[[noreturn]] void Refuse(const sdf::ElementPtr& element, const std::string& why) {
+  throw ConfigError(PlaceOf(element) + ": " + why);
+}
+
+// ":line" of the last element that carries a name which the message gives in brackets or after
+// "named": libsdformat knows no line for what it finds out late.
+std::string LineOfNamed(const sdf::ElementPtr& root, const std::string& message) {
+  const std::regex quoted("\\[([^\\]]+)\\]|named ([^ ]+)");
+  for (std::sregex_iterator match(message.begin(), message.end(), quoted), end; match != end;
+       ++match) {
+    const std::string name = (*match)[1].matched ? (*match)[1] : (*match)[2];
+    int line = 0;
+    const auto search = [&](const auto& self, const sdf::ElementPtr& element) -> void {
+      if (element->HasAttribute("name") && element->Get<std::string>("name") == name) {
+        line = std::max(line, element->LineNumber().value_or(0));
+      }
+      for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
+        self(self, child);
+      }
+    };
+    if (root) search(search, root);
+    if (line > 0) return ":" + std::to_string(line);
+  }
+  return "";
+}
+
+// The first thing that libsdformat disliked, in one line.
+void RefuseErrors(const std::string& path, const sdf::Root& root, const sdf::Errors& errors,
+                  const std::vector<std::string>& said) {
+  if (errors.empty() && said.empty()) return;
+  std::string place = path;
+  std::string why = said.empty() ? "" : OneLine(said.front());
+  std::smatch match;
+  if (!errors.empty() && errors.front().LineNumber()) {
+    const sdf::Error& first = errors.front();
+    place = first.FilePath().value_or(path) + ":" + std::to_string(*first.LineNumber());
+    why = OneLine(first.Message()) + (why.empty() ? "" : ": " + why);
+    const std::regex unknown("XML Element\\[(.+)\\], child of element\\[(.+)\\], not defined.*");
+    if (std::regex_match(why, match, unknown)) {
+      why = "SDFormat has no <" + match[1].str() + "> in <" + match[2].str() +
+            ">: correct or remove it";
+    }
+  } else if (std::regex_search(why, match, std::regex("Error=(\\w+).*Line number=(\\d+)(.*)"))) {
+    if (match[2] != "0") place += ":" + match[2].str();
+    why = "broken XML, " + match[1].str() + match[3].str();
+  } else if (why.empty()) {
+    why = OneLine(errors.front().Message());
+    place += LineOfNamed(root.Element(), why);
+    if (errors.front().Code() == sdf::ErrorCode::FILE_READ) why = "this is not an SDFormat file";
+  }
+  throw ConfigError(place + ": " + why + "; an SDFormat world (sdformat.org) is expected");
+}
+
+Vec3 FromSdf(const ignition::math::Vector3d& v) {
+  return {v.X(), v.Y(), v.Z()};
+}
+
+Pose FromSdf(const ignition::math::Pose3d& pose) {
+  const auto& q = pose.Rot();
+  return {FromSdf(pose.Pos()), Quat(q.W(), q.X(), q.Y(), q.Z()).normalized()};
+}
+
+Pose Resolve(const sdf::SemanticPose& semantic, const sdf::ElementPtr& element) {
+  ignition::math::Pose3d pose;
+  const sdf::Errors errors = semantic.Resolve(pose);
+  if (!errors.empty()) Refuse(element, OneLine(errors.front().Message()));
+  if (!pose.IsFinite()) Refuse(element, "a pose of finite numbers is expected");
+  return FromSdf(pose);
+}
+
+// The element at the end of a path of names, if every one of them stands in the file.
+sdf::ElementPtr FindExplicit(sdf::ElementPtr element, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (!element->HasElement(name)) return nullptr;
+    element = element->GetElement(name);
+    if (!element->GetExplicitlySetInFile()) return nullptr;
+  }
+  return element;
+}
+
+double Positive(const sdf::ElementPtr& element, const std::string& what, double value) {
+  if (!std::isfinite(value) || !(value > 0)) {
+    Refuse(element, what + " = " + std::to_string(value) + ": a number above 0 is expected");
+  }
+  return value;
+}
+
+Shape ReadShape(const sdf::Collision& collision) {
+  const sdf::Geometry& geometry = *collision.Geom();
+  const sdf::ElementPtr at = collision.Element()->HasElement("geometry")
+                                 ? collision.Element()->GetElement("geometry")
+                                 : collision.Element();
+  switch (geometry.Type()) {
+    case sdf::GeometryType::BOX: {
+      const Vec3 size = FromSdf(geometry.BoxShape()->Size());
+      for (const double edge : size) Positive(at, "an edge of the box", edge);
+      return Box{size / 2};
+    }
+    case sdf::GeometryType::SPHERE:
+      return Sphere{Positive(at, "the radius", geometry.SphereShape()->Radius())};
+    case sdf::GeometryType::PLANE: {
+      const Vec3 normal = FromSdf(geometry.PlaneShape()->Normal());
+      Positive(at, "the length of the normal", normal.norm());
+      return HalfSpace{normal.normalized()};
+    }
+    case sdf::GeometryType::CYLINDER: {
+      const sdf::Cylinder& cylinder = *geometry.CylinderShape();
+      return Cylinder{Positive(at, "the radius", cylinder.Radius()),
+                      Positive(at, "the length", cylinder.Length()) / 2};
+    }
+    case sdf::GeometryType::CAPSULE: {
+      const sdf::Capsule& capsule = *geometry.CapsuleShape();
+      return Capsule{Positive(at, "the radius", capsule.Radius()),
+                     Positive(at, "the length", capsule.Length()) / 2};
+    }
+    case sdf::GeometryType::ELLIPSOID: {
+      const Vec3 radii = FromSdf(geometry.EllipsoidShape()->Radii());
+      for (const double radius : radii) Positive(at, "a radius", radius);
+      return Ellipsoid{radii};
+    }
+    default:
+      Refuse(at,
+             "a collision may be a box, sphere, plane, cylinder, capsule or ellipsoid; meshes, "
+             "heightmaps and the like are not built");
+  }
+}
+
+// SDF's default is 1.
+double ReadFriction(const sdf::ElementPtr& collision) {
+  struct Names {
+    const char *engine, *first, *second;
+  };
+  for (const Names& names : {Names{"ode", "mu", "mu2"}, Names{"bullet", "friction", "friction2"}}) {
+    const auto first = FindExplicit(collision, {"surface", "friction", names.engine, names.first});
+    const auto second =
+        FindExplicit(collision, {"surface", "friction", names.engine, names.second});
+    if (!first && !second) continue;
+    const sdf::ElementPtr& given = first ? first : second;
+    const auto mu = given->Get<double>();
+    if (!std::isfinite(mu) || mu < 0) {
+      Refuse(given, given->GetName() + " = " + std::to_string(mu) + ": 0 or more is expected");
+    }
+    if (first && second && second->Get<double>() != mu) {
+      Refuse(second, std::string(names.second) + " differs from " + names.first +
+                         ": friction that depends on direction is not built; give both the same");
+    }
+    return mu;
+  }
+  return 1;
+}
+
+void ReadCompliance(const sdf::ElementPtr& collision, Collider& collider,
+                    std::vector<std::string>& warnings) {
+  for (const char* engine : {"ode", "bullet"}) {
+    const auto kp = FindExplicit(collision, {"surface", "contact", engine, "kp"});
+    const auto kd = FindExplicit(collision, {"surface", "contact", engine, "kd"});
+    if (!kp) {
+      if (kd) warnings.push_back(PlaceOf(kd) + ": <kd> without <kp> is not used");
+      continue;
+    }
+    const double stiffness = Positive(kp, "kp", kp->Get<double>());
+    if (stiffness > kLargestStiffness) {
+      warnings.push_back(PlaceOf(kp) +
+                         ": <kp> above 1e6 N/m can be rendered by no device; the "
+                         "haptic server's own stiffness is used");
+      return;
+    }
+    const double damping = kd ? kd->Get<double>() : 0;
+    if (!(damping >= 0 && damping <= kLargestDamping)) {
+      Refuse(kd, "kd = " + std::to_string(damping) + ": 0 to 1e4 N s/m is expected");
+    }
+    collider.stiffness_n_per_m = stiffness;
+    collider.damping_ns_per_m = damping;
+    return;
+  }
+}
+
+void ReadInertia(const sdf::Link& link, SceneBody& body, std::vector<std::string>& warnings) {
+  const auto mass = FindExplicit(link.Element(), {"inertial", "mass"});
+  const sdf::ElementPtr at = mass ? mass : link.Element();
+  if (!FindExplicit(link.Element(), {"inertial"})) {
+    warnings.push_back(PlaceOf(at) + ": link " + body.name +
+                       " has no <inertial>: SDF's default, 1 kg and 1 kg m^2, is used");
+  }
+  const auto& matrix = link.Inertial().MassMatrix();
+  body.mass_kg = Positive(at, "the mass of link " + body.name, matrix.Mass());
+  if (!matrix.IsPositive() || !matrix.IsValid()) {
+    Refuse(at,
+           "the inertia of link " + body.name +
+               " belongs to no body: its principal moments must be above 0, and none larger than "
+               "the sum of the other two");
+  }
+  const auto moi = link.Inertial().Moi();  // about the centre of mass, along the link's axes
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column) {
+      body.inertia(static_cast<int>(row), static_cast<int>(column)) = moi(row, column);
+    }
+  }
+}
+
+class Loader {
+ public:
+  explicit Loader(LoadedScene& loaded) : loaded_(loaded) {}
+
+  void ReadModel(const sdf::Model& model, const std::string& prefix, const Pose& pose_WP,
+                 bool in_static) {
+    const std::string name = prefix + model.Name();
+    const bool is_static = in_static || model.Static();
+    const Pose pose_WM = pose_WP * Resolve(model.SemanticPose(), model.Element());
+    for (std::uint64_t i = 0; i < model.LinkCount(); ++i) {
+      ReadLink(*model.LinkByIndex(i), name, pose_WM, is_static);
+    }
+    if (!is_static && model.LinkCount() > 1 && !model.SelfCollide()) {
+      const auto self_collide = FindExplicit(model.Element(), {"self_collide"});
+      if (self_collide) {
+        Refuse(self_collide, "<self_collide> false of model " + name +
+                                 ": links that pass through each other are not built");
+      }
+      loaded_.warnings.push_back(PlaceOf(model.Element()) + ": the links of model " + name +
+                                 " collide with each other here, which SDF says with "
+                                 "<self_collide>true</self_collide>");
+    }
+    for (std::uint64_t i = 0; i < model.ModelCount(); ++i) {
+      ReadModel(*model.ModelByIndex(i), name + "::", pose_WM, is_static);
+    }
+  }
+
+ private:
+  void ReadLink(const sdf::Link& link, const std::string& model, const Pose& pose_WM,
+                bool is_static) {
+    SceneBody body;
+    body.name = model + "::" + link.Name();
+    body.fixed = is_static;
+    if (link.CollisionCount() == 0) {
+      if (is_static) return;  // only for eyes
+      Refuse(link.Element(), "link " + body.name +
+                                 " can move and has no collision; give it one, or make its model "
+                                 "static");
+    }
+    const Pose pose_WL = pose_WM * Resolve(link.SemanticPose(), link.Element());
+    Pose pose_LB;  // the link's axes, at its centre of mass
+    if (!is_static) {
+      ReadInertia(link, body, loaded_.warnings);
+      pose_LB.position = FromSdf(link.Inertial().Pose().Pos());
+    }
+    body.pose_WB = pose_WL * pose_LB;
+    for (std::uint64_t i = 0; i < link.CollisionCount(); ++i) {
+      const sdf::Collision& collision = *link.CollisionByIndex(i);
+      Collider collider;
+      collider.shape = ReadShape(collision);
+      if (!is_static && std::holds_alternative<HalfSpace>(collider.shape)) {
+        Refuse(collision.Element(),
+               "link " + body.name + " can move and has a plane; planes belong to static models");
+      }
+      collider.pose_BS = pose_LB.Inverse() * Resolve(collision.SemanticPose(), collision.Element());
+      collider.friction = ReadFriction(collision.Element());
+      if (!is_static && i > 0 && collider.friction != body.colliders[0].friction) {
+        Refuse(collision.Element(), "collision " + collision.Name() + " of link " + body.name +
+                                        " has another friction than the first; give all "
+                                        "collisions of a moving link the same");
+      }
+      ReadCompliance(collision.Element(), collider, loaded_.warnings);
+      body.colliders.push_back(collider);
+    }
+    if (loaded_.scene.bodies.size() == protocol::kMaxBodies) {
+      Refuse(link.Element(), "more than " + std::to_string(protocol::kMaxBodies) + " bodies");
+    }
+    loaded_.scene.bodies.push_back(std::move(body));
+  }
+
+  LoadedScene& loaded_;
+};
+
+}  // namespace
+
+LoadedScene LoadSdf(const std::string& path) {
+  const std::ifstream file(path);
+  if (!file || std::filesystem::is_directory(path)) {
+    const int error = file ? EISDIR : errno;
+    throw ConfigError(path + ": the scene cannot be read: " + std::strerror(error));
+  }
+  CaptureStandardError captured;
+  sdf::ParserConfig config;
+  config.SetWarningsPolicy(sdf::EnforcementPolicy::ERR);
+  config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::ERR);
+  // Included models are looked up beside the scene, never on the network.
+  const std::string folder = std::filesystem::absolute(path).parent_path().string();
+  config.AddURIPath("model://", folder);
+  config.SetFindCallback([](const std::string&) { return std::string(); });
+
+  sdf::Root root;
+  const sdf::Errors errors = root.Load(path, config);
+  RefuseErrors(path, root, errors, captured.Messages("Error"));
+  if (root.WorldCount() != 1) {
+    throw ConfigError(path + ": " + std::to_string(root.WorldCount()) +
+                      " worlds; exactly one <world> is expected");
+  }
+  const sdf::World& world = *root.WorldByIndex(0);
+
+  LoadedScene loaded;
+  for (const std::string& warning : captured.Messages("Warning")) {
+    loaded.warnings.push_back(path + ": " + OneLine(warning));
+  }
+  SurveyWorld(world.Element(), loaded.warnings);
+  loaded.scene.name = world.Name();
+  loaded.scene.gravity = FromSdf(world.Gravity());
+  if (!loaded.scene.gravity.allFinite()) Refuse(world.Element(), "gravity must be finite");
+  Loader loader(loaded);
+  for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
+    loader.ReadModel(*world.ModelByIndex(i), "", Pose{}, /*in_static=*/false);
+  }
+  if (loaded.scene.bodies.empty()) {
+    Refuse(world.Element(),
+           "world " + world.Name() + " is empty; at least one model with a collision is expected");
+  }
+  return loaded;
+}
+
+}  // namespace rikiseki::world

@@ -1,0 +1,18 @@
+// Goes through a parsed SDFormat file and says what of it this world does not do, so that nothing
+// that a file asks for is ignored in silence.
+#pragma once
+
+#include <sdf/Element.hh>
+#include <string>
+#include <vector>
+
+namespace rikiseki::world {
+
+/// "file:line", of the file that the element stands in (an included one, perhaps).
+std::string PlaceOf(const sdf::ElementPtr& element);
+
+/// Appends one line for each explicit element below `world` that is not used. Throws ConfigError
+/// for one that would change the motion of bodies.
+void SurveyWorld(const sdf::ElementPtr& world, std::vector<std::string>& warnings);
+
+}  // namespace rikiseki::world
