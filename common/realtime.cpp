@@ -52,10 +52,9 @@ RealtimeObtained Apply(const RealtimeRequest& request) {
                           " (needs RLIMIT_RTPRIO, see README)";
     }
   }
-  sched_param actual{};
-  obtained.policy = sched_getscheduler(0) & ~SCHED_RESET_ON_FORK;
-  sched_getparam(0, &actual);
-  obtained.priority = actual.sched_priority;
+  const RealtimeObtained now = ReadScheduling();
+  obtained.policy = now.policy;
+  obtained.priority = now.priority;
   return obtained;
 }
 
@@ -68,6 +67,15 @@ void* Run(void* argument) {
 }
 
 }  // namespace
+
+RealtimeObtained ReadScheduling() {
+  sched_param actual{};
+  sched_getparam(0, &actual);
+  return {.policy = sched_getscheduler(0) & ~SCHED_RESET_ON_FORK,
+          .priority = actual.sched_priority,
+          .cpu = -1,
+          .refusal = ""};
+}
 
 std::string LockMemory() {
   mallopt(M_TRIM_THRESHOLD, -1);

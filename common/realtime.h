@@ -25,6 +25,9 @@ struct RealtimeObtained {
   std::string refusal;  // empty, or why less was obtained than requested, in words
 };
 
+/// What the calling thread runs under.
+RealtimeObtained ReadScheduling();
+
 /// Locks present and future memory and stops the allocator from giving pages back, so that the loop
 /// meets no page fault. Returns an empty string, or why it was refused, in words.
 std::string LockMemory();

@@ -12,7 +12,7 @@
 #include "common/version.h"
 #include "haptic_server/device/spidar.h"
 #include "haptic_server/loop.h"
-#include "protocol/describe.h"
+#include "protocol/words.h"
 
 namespace {
 
@@ -62,7 +62,7 @@ void Supervise(const HapticLoop& loop, protocol::PeerLink& link) {
     for (const std::string& line : link.PollNews()) spdlog::info("world: {}", line);
     const protocol::ForceReason reason = loop.reason();
     if (IsRendering(reason) && IsRendering(logged)) continue;
-    if (reason != logged) spdlog::info("force: {}", protocol::Describe(reason));
+    if (reason != logged) spdlog::info("force: {}", protocol::Sentence(reason));
     logged = reason;
   }
 }

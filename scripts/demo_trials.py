@@ -76,7 +76,7 @@ class Pair:
                 self.check_alive()
                 raise RuntimeError("haptic_status ended")
             reading = json.loads(line)
-            if "haptic" in reading and "world" in reading and reading["haptic"] and reading["world"]:
+            if reading["books"] and "newest" in reading["haptic"] and "newest" in reading["world"]:
                 yield reading
 
     def reset_scene(self):
@@ -99,6 +99,10 @@ def moving_body(reading):
     return next((body for body in reading["world"]["bodies"] if body["mass_kg"] > 0), None)
 
 
+def pointer(reading):
+    return reading["haptic"]["newest"]["pointers"][0]
+
+
 class Trials:
     """Watches the readings, tells when a push is over and where the block stopped."""
 
@@ -107,6 +111,7 @@ class Trials:
         self.stops = []  # m, displacement along x of each push
         self.start_x = None
         self.generation = None
+        self.resetting = False
         self.last = None
 
     def watch(self, reading):
@@ -118,23 +123,26 @@ class Trials:
         if body["generation"] != self.generation:
             self.generation = body["generation"]
             self.start_x = body["position_m"][0]
+            self.resetting = False
+        if self.resetting:
             return False
-        finger = reading["haptic"]["pointer"]
+        finger = pointer(reading)
         at_home = finger["position_m"][0] < -0.045 and abs(finger["velocity_m_per_s"][0]) < 0.05
         at_rest = max(abs(v) for v in body["velocity_m_per_s"]) < 1e-3
         displacement = body["position_m"][0] - self.start_x
         if at_home and at_rest and displacement > 1e-3:
             self.stops.append(displacement)
+            self.resetting = True
             return True
         return False
 
     def live_line(self, remaining):
         reading = self.last
         body = moving_body(reading)
-        force = reading["haptic"]["pointer"]["force_n"][0]
+        force = pointer(reading)["force_n"][0]
         return (f"{self.coupling:8s} {remaining:4.0f} s left  pushes {len(self.stops):3d}  "
                 f"force {force:6.2f} N  block {1e3 * (body['position_m'][0] - self.start_x):6.1f} mm  "
-                f"{reading['haptic']['reason_text'][:40]:40s}")
+                f"{reading['haptic'].get('reason', ''):16s}")
 
 
 def run(arguments, coupling, seconds, logs, interrupted):
@@ -155,7 +163,7 @@ def run(arguments, coupling, seconds, logs, interrupted):
         # The books are read when nothing is under way: wait for the last acknowledgement.
         for reading in pair.readings(time.monotonic() + 2.0):
             trials.last = reading
-            if not any(reading["haptic"]["books"]["pending"]):
+            if not any(reading["books"]["pending"]):
                 break
     except KeyboardInterrupt:
         interrupted[0] = True
@@ -180,8 +188,7 @@ def table(all_trials):
         if trials.last is None or not stops:
             print(f"{trials.coupling:9s} {len(stops):6d}   no push was completed")
             continue
-        haptic, world = trials.last["haptic"], trials.last["world"]
-        books = haptic["books"]
+        books, world = trials.last["books"], trials.last["world"]
         exact = books["balanced"] and not any(books["pending"])
         balanced = balanced and exact
         received = [a * NEWTON_SECONDS + p for a, p in zip(world["applied"], world["penalty_impulse_ns"])]
@@ -195,10 +202,11 @@ def table(all_trials):
         if trials.last is None:
             continue
         for name in ("haptic", "world"):
-            loop = trials.last[name]["loop"]
-            late = loop["lateness_us"]
-            print(f"{name:9s} {loop['rate_hz']:8.1f} {late['p50']:8.0f} {late['p99']:8.0f} {late['p99_9']:9.0f} "
-                  f"{loop['missed']:7d}   {loop['scheduling']} ({trials.coupling})")
+            side = trials.last[name]
+            late, scheduling = side["lateness_us"], side["scheduling"]
+            memory = ", memory locked" if scheduling["memory_locked"] else ""
+            print(f"{name:9s} {side['rate']['measured_hz'] or 0:8.1f} {late['p50']:8.0f} {late['p99']:8.0f} "
+                  f"{late['p99_9']:9.0f} {side['missed']:7d}   {scheduling['policy']}{memory} ({trials.coupling})")
     print("\nstop: where the block came to rest after one push, from its start, over the pushes; spread: largest -"
           " smallest.\nreceived: momentum that the world gave to the block for the finger. lateness: of the wake-up,"
           " against the schedule.")

@@ -4,6 +4,7 @@
 
 #include "common/clock.h"
 #include "common/histogram.h"
+#include "common/realtime.h"
 
 namespace rikiseki::world {
 namespace {
@@ -27,6 +28,9 @@ WorldLoop::WorldLoop(const Settings& settings, WorldStep& step, protocol::Segmen
       healths_(owner.Writer<protocol::WorldHealth>()),
       bodies_(owner.Stream(protocol::StreamType::kWorldBodies)) {
   loop_health_.period_ns = static_cast<std::uint64_t>(period_ns_);
+  const RealtimeObtained scheduling = ReadScheduling();
+  loop_health_.scheduling.policy = static_cast<std::uint32_t>(scheduling.policy);
+  loop_health_.scheduling.priority = static_cast<std::uint32_t>(scheduling.priority);
 }
 
 void WorldLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) {
@@ -103,6 +107,7 @@ void WorldLoop::Publish(std::int64_t now_ns, std::int64_t deadline_ns) {
   health.lapped = lapped_before_ + ticks_.ring().lost();
   health.peer_state = peer_state_;
   health.peer_epoch = link_.current() == nullptr ? 0 : link_.current()->epoch();
+  health.scheduling = loop_health_.scheduling;
   health.lateness = loop_health_.lateness;
   health.duration = loop_health_.duration;
   healths_.Publish(health, stamp_ns);

@@ -1,8 +1,10 @@
 // world_server: runs a dynamic rigid-body world at 10-60 Hz for a haptic server beside it.
 #include <spdlog/spdlog.h>
 
+#include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <future>
 
 #include "common/clock.h"
 #include "common/daemon.h"
@@ -20,40 +22,68 @@ using namespace rikiseki::world;  // NOLINT(google-build-using-namespace)
 // Room in world.bodies for scenes that grow when they are reloaded.
 constexpr std::uint32_t kBodyRoom = 256;
 
-std::unique_ptr<DynamicsWorld> MakeDynamics(const Scene& scene, const Settings& settings) {
-  return std::make_unique<BulletWorld>(scene, settings.physics.substep_ms * 1e-3);
+struct ReadyScene {
+  LoadedScene loaded;
+  std::unique_ptr<DynamicsWorld> dynamics;
+};
+
+ReadyScene Load(const Settings& settings) {
+  ReadyScene ready;
+  ready.loaded = LoadSdf(settings.scene.file);
+  for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
+  ready.dynamics = std::make_unique<BulletWorld>(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
+  return ready;
 }
 
-LoadedScene Load(const Settings& settings) {
-  LoadedScene loaded = LoadSdf(settings.scene.file);
-  for (const std::string& warning : loaded.warnings) spdlog::warn("{}", warning);
-  return loaded;
-}
+// Reads the scene again beside the running loop: parsing takes many world ticks.
+class SceneReload {
+ public:
+  explicit SceneReload(const Settings& settings) : settings_(settings) {}
 
-// The file is read anew; if it is refused, the running scene stays.
-void Reload(const Settings& settings, WorldStep& step) {
-  try {
-    const LoadedScene loaded = Load(settings);
-    step.Replace(loaded.scene, MakeDynamics(loaded.scene, settings));
-    spdlog::info("scene {} loaded anew: {} bodies", loaded.scene.name, loaded.scene.bodies.size());
-  } catch (const std::exception& error) {
-    spdlog::error("the scene stays as it was: {}", error.what());
+  /// A second request while one is under way starts another after it.
+  void Request() { ++requests_; }
+
+  /// Starts what was requested, and puts what is ready in the place of the running scene. If the file is
+  /// refused, the running scene stays.
+  void Poll(WorldStep& step) {
+    if (loading_.valid() && loading_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+      try {
+        ReadyScene ready = loading_.get();
+        spdlog::info("scene {} loaded anew: {} bodies", ready.loaded.scene.name,
+                     ready.loaded.scene.bodies.size());
+        step.Replace(ready.loaded.scene, std::move(ready.dynamics));
+      } catch (const std::exception& error) {
+        spdlog::error("the scene stays as it was: {}", error.what());
+      }
+    }
+    if (requests_ > 0 && !loading_.valid()) {
+      requests_ = 0;
+      loading_ = std::async(std::launch::async, [this] { return Load(settings_); });
+    }
   }
-}
+
+ private:
+  const Settings& settings_;
+  int requests_ = 0;
+  std::future<ReadyScene> loading_;
+};
 
 void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
                      protocol::PeerLink& link) {
+  SceneReload reload(settings);
   PeriodicSchedule schedule(MonotonicNow(), settings.period_ns());
   std::int64_t missed = 0;
   while (true) {
     SleepUntil(schedule.deadline_ns());
+    const std::int64_t now_ns = MonotonicNow();
     switch (WaitForSignal(0)) {
       case SIGINT:
       case SIGTERM: return;
-      case SIGHUP: Reload(settings, step); break;
+      case SIGHUP: reload.Request(); break;
       default: break;
     }
-    loop.Tick(MonotonicNow(), schedule.deadline_ns(), missed);
+    reload.Poll(step);
+    loop.Tick(now_ns, schedule.deadline_ns(), missed);
     for (const std::string& line : link.PollNews()) spdlog::info("haptic side: {}", line);
     missed = schedule.Advance(MonotonicNow());
   }
@@ -68,16 +98,17 @@ int Run(int argc, char** argv) {
   std::string description;
   const Settings settings = LoadSettings(options.config, overrides, &description);
   StartLogging("world_server");
-  LoadedScene loaded = Load(settings);
+  ReadyScene ready = Load(settings);
+  const Scene& scene = ready.loaded.scene;
   if (options.check) {
     std::fputs(description.c_str(), stdout);
-    std::printf("scene %s: %zu bodies\n", loaded.scene.name.c_str(), loaded.scene.bodies.size());
+    std::printf("scene %s: %zu bodies\n", scene.name.c_str(), scene.bodies.size());
     return kExitOk;
   }
   BlockSignals();
   const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
   const auto body_room =
-      std::max(kBodyRoom, static_cast<std::uint32_t>(loaded.scene.bodies.size()));
+      std::max(kBodyRoom, static_cast<std::uint32_t>(scene.bodies.size()));
   protocol::SegmentOwner owner({.instance = options.instance,
                                 .role = protocol::Role::kWorld,
                                 .streams = protocol::WorldStreams(period_ns, body_room, period_ns),
@@ -89,10 +120,10 @@ int Run(int argc, char** argv) {
                 .role = protocol::Role::kHaptic,
                 .required = {{.type = protocol::StreamType::kHapticTick}},
                 .owners = {}}});
-  WorldStep step(settings, loaded.scene, MakeDynamics(loaded.scene, settings), owner.epoch());
+  WorldStep step(settings, scene, std::move(ready.dynamics), owner.epoch());
   WorldLoop loop(settings, step, owner, link);
   spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(), settings.loop.rate_hz,
-               loaded.scene.name, loaded.scene.bodies.size(), kBuild);
+               scene.name, scene.bodies.size(), kBuild);
   RunUntilStopped(settings, step, loop, link);
   spdlog::info("stopped");
   return kExitOk;

@@ -6,7 +6,7 @@
 #include "common/clock.h"
 #include "common/histogram.h"
 #include "common/realtime.h"
-#include "protocol/tools/words.h"
+#include "protocol/words.h"
 
 namespace rikiseki::protocol {
 namespace {

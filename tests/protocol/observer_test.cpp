@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "common/clock.h"
-#include "protocol/tools/words.h"
+#include "protocol/words.h"
 #include "tests/protocol/support.h"
 
 namespace rikiseki::protocol {

@@ -1,4 +1,4 @@
-#include "protocol/tools/words.h"
+#include "protocol/words.h"
 
 #include <cstring>
 
@@ -26,7 +26,7 @@ std::string Sentence(ForceReason reason) {
     case ForceReason::kWorldAbsent:
       return "No world is attached, so the force is zero.";
     case ForceReason::kOverSpeed:
-      return "The finger is faster than the speed limit, so it is only slowed down.";
+      return "The finger is faster than the speed limit, so it feels no force.";
     case ForceReason::kNotFinite:
       return "A measurement or a result was not a finite number, so the force is zero.";
     case ForceReason::kNoChannel:
