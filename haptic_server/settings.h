@@ -60,7 +60,7 @@ struct HandSettings {
   double damping_ns_per_m = 15;
   double stiffness_n_per_m = 500;
   Vec3 home_mm = Vec3(-50, 0, 0);    // where a push starts and ends
-  Vec3 stroke_mm = Vec3(150, 0, 0);  // the reach of one push
+  Vec3 stroke_mm = Vec3(110, 0, 0);  // the reach of one push
   double reach_ms = 300;             // there
   double hold_ms = 100;
   double return_ms = 300;            // and back
