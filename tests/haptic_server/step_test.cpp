@@ -424,8 +424,9 @@ TEST_CASE(
         world_frames = 0;
       }
       if (k % 500 == 0) {  // other bodies come near
-        bench.planes = {WallFacing(Vec3::Zero(), -Vec3::UnitX(), random() % 6),
-                        WallFacing(Vec3(0, -0.02, 0), Vec3(0.2, 1, 0).normalized(), random() % 6)};
+        const auto body = [&] { return static_cast<std::uint32_t>(random() % 6); };
+        bench.planes = {WallFacing(Vec3::Zero(), -Vec3::UnitX(), body()),
+                        WallFacing(Vec3(0, -0.02, 0), Vec3(0.2, 1, 0).normalized(), body())};
       }
       bench.beats = alive;
       time_s += 1e-3;
@@ -487,7 +488,8 @@ TEST_CASE("hostile frames, samples and worlds: finite, capped, slew-limited, zer
       if (alive && (k % 20 == 0 || chance(5))) {
         frame = &bench.NextFrame();
         frame->period_ns = chance(20) ? random() : 20'000'000;
-        frame->plane_count = chance(10) ? static_cast<std::uint32_t>(random()) : random() % 33;
+        frame->plane_count = chance(10) ? static_cast<std::uint32_t>(random())
+                                        : static_cast<std::uint32_t>(random() % 33);
         frame->acked_epoch = chance(800) ? kOwnEpoch : word();
         frame->acked_tick = chance(500) ? static_cast<std::uint64_t>(k) - random() % 50 : word();
         frame->baseline_tick = word();
