@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <regex>
 #include <set>
 #include <sstream>
 
@@ -26,12 +25,13 @@ std::string Refusal(const std::vector<std::string>& set) {
 std::set<std::string> KeysOf(const std::string& text, bool sections) {
   std::set<std::string> keys;
   std::istringstream lines(text);
-  const std::regex key("^([a-z_.]+) = .*");
   std::string section;
   for (std::string line; std::getline(lines, line);) {
     if (sections && line.starts_with("[")) section = line.substr(1, line.find(']') - 1) + ".";
-    std::smatch match;
-    if (std::regex_match(line, match, key)) keys.insert(section + match[1].str());
+    const auto equals = line.find(" = ");
+    if (equals != std::string::npos && !line.starts_with(" ") && !line.starts_with("#")) {
+      keys.insert(section + line.substr(0, equals));
+    }
   }
   return keys;
 }
