@@ -19,7 +19,7 @@ struct WorldStep::State {
   LedgerReader ledger;
   std::vector<Finger> fingers;   // of the newest message
   double stiffness_n_per_m = 0;  // that it renders with
-  double silence_s = 0;          // world time since it came
+  std::int64_t silence_ns = 0;   // world time since it came
   std::uint64_t frame = 0;
   std::int64_t world_time_ns = 0;
   std::vector<protocol::Body> bodies;
@@ -79,7 +79,7 @@ std::vector<Kick> WorldStep::State::Kicks(double period_s) {
   const std::span<const PendingImpulse> owed = ledger.Take();
   if (settings.coupling.coupling == protocol::Coupling::kImpulse) return ImpulseKicks(owed, states);
   // A finger that has not been heard of for a gap pushes no longer.
-  if (silence_s > settings.gap_s()) return {};
+  if (silence_ns > std::llround(settings.gap_s() * 1e9)) return {};
   return PenaltyKicks(scene, states, fingers,
                       {.stiffness_n_per_m = stiffness_n_per_m,
                        .period_s = period_s,
@@ -108,15 +108,16 @@ void WorldStep::Consume(const protocol::HapticTick& tick) {
   if (!state_->ledger.Consume(tick)) return;
   state_->fingers = FingersOf(tick);
   state_->stiffness_n_per_m = tick.stiffness;
-  state_->silence_s = 0;
+  state_->silence_ns = 0;
 }
 
 void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   State& s = *state_;
   const std::vector<Kick> kicks = s.Kicks(period_s);
   s.dynamics->ApplyAndStep(kicks, period_s);
-  s.silence_s += period_s;
-  s.world_time_ns += std::llround(period_s * 1e9);
+  const std::int64_t period_ns = std::llround(period_s * 1e9);
+  s.silence_ns += period_ns;
+  s.world_time_ns += period_ns;
   s.ReadStates();
 
   frame = {};

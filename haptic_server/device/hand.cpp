@@ -100,7 +100,7 @@ ImpedanceStep ExactStep(const Impedance& impedance, double dt_s) noexcept {
     step.yf = ForceResponseSeries(impedance, dt_s);
   } else if (k == 0) {
     step.yf = (dt_s - s) / b;
-  } else if (square > 0 && split * dt_s > 0.5) {
+  } else if (square > 0 && split * dt_s > 0.01) {
     step.yf = (fast * std::expm1(slow * dt_s) - slow * std::expm1(fast * dt_s)) / (slow - fast) / k;
   } else {
     step.yf = (1 - step.yy) / k;

@@ -151,6 +151,7 @@ NearestPoint Find(const Ellipsoid& ellipsoid, const Vec3& p) {
   for (int i = 0; i < 3; ++i) {
     e[i] = radii[order[i]];
     y[i] = std::abs(p[order[i]]);
+    if (y[i] < 1e-150 * e[i]) y[i] = 0;  // its square would underflow
   }
   NearestPoint nearest;
   nearest.degenerate = !EllipsoidFoot(3, e, y, x);

@@ -21,10 +21,10 @@ using Shape = std::variant<Box, Sphere, HalfSpace, Cylinder, Capsule, Ellipsoid>
 /// One collision shape of a body.
 struct Collider {
   Shape shape;
-  Pose pose_BS;            // shape in the body's centre-of-mass frame
+  Pose pose_BS = {};       // shape in the body's centre-of-mass frame
   double friction = 1;     // Coulomb; two surfaces combine as sqrt(mu1 mu2)
-  std::optional<double> stiffness_n_per_m;  // rendered, where the scene says so
-  std::optional<double> damping_ns_per_m;
+  std::optional<double> stiffness_n_per_m = {};  // rendered, where the scene says so
+  std::optional<double> damping_ns_per_m = {};
 };
 
 struct SceneBody {
@@ -32,8 +32,8 @@ struct SceneBody {
   bool fixed = false;
   double mass_kg = 0;      // > 0 unless fixed
   Mat3 inertia = Mat3::Zero();  // kg m^2, about the centre of mass, in the body frame
-  Pose pose_WB;            // of the centre-of-mass frame at the start
-  std::vector<Collider> colliders;
+  Pose pose_WB = {};       // of the centre-of-mass frame at the start
+  std::vector<Collider> colliders = {};
 };
 
 struct Scene {

@@ -60,23 +60,34 @@ std::string OneLine(std::string text) {
   throw ConfigError(PlaceOf(element) + ": " + why);
 }
 
-// ":line" of the last element that carries a name which the message gives in brackets or after
-// "named": libsdformat knows no line for what it finds out late.
-std::string LineOfNamed(const sdf::ElementPtr& root, const std::string& message) {
+// The line of the last element that fits, or 0.
+template <typename Fits>
+int LastLine(const sdf::ElementPtr& element, const Fits& fits) {
+  int line = fits(element) ? element->LineNumber().value_or(0) : 0;
+  for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
+    line = std::max(line, LastLine(child, fits));
+  }
+  return line;
+}
+
+// ":line" of what a message is about, as far as it can be told: libsdformat knows no line for what
+// it finds out late. Most messages give a name, in brackets or after "named".
+std::string LineOf(const std::string& message, const sdf::ElementPtr& root) {
+  if (!root) return "";
   const std::regex quoted("\\[([^\\]]+)\\]|named ([^ ]+)");
   for (std::sregex_iterator match(message.begin(), message.end(), quoted), end; match != end;
        ++match) {
     const std::string name = (*match)[1].matched ? (*match)[1] : (*match)[2];
-    int line = 0;
-    const auto search = [&](const auto& self, const sdf::ElementPtr& element) -> void {
-      if (element->HasAttribute("name") && element->Get<std::string>("name") == name) {
-        line = std::max(line, element->LineNumber().value_or(0));
-      }
-      for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
-        self(self, child);
-      }
-    };
-    if (root) search(search, root);
+    const int line = LastLine(root, [&](const sdf::ElementPtr& element) {
+      return element->HasAttribute("name") && element->Get<std::string>("name") == name;
+    });
+    if (line > 0) return ":" + std::to_string(line);
+  }
+  if (message.starts_with("A model must have at least one link")) {
+    const int line = LastLine(root, [](const sdf::ElementPtr& element) {
+      return element->GetName() == "model" && !element->HasElement("link") &&
+             !element->HasElement("model");
+    });
     if (line > 0) return ":" + std::to_string(line);
   }
   return "";
@@ -103,7 +114,7 @@ void RefuseErrors(const std::string& path, const sdf::Root& root, const sdf::Err
     why = "broken XML, " + match[1].str() + match[3].str();
   } else if (why.empty()) {
     why = OneLine(errors.front().Message());
-    place += LineOfNamed(root.Element(), why);
+    place += LineOf(why, root.Element());
     if (errors.front().Code() == sdf::ErrorCode::FILE_READ) why = "this is not an SDFormat file";
   }
   throw ConfigError(place + ": " + why + "; an SDFormat world (sdformat.org) is expected");

@@ -1,0 +1,156 @@
+#include "haptic_server/device/spidar.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "haptic_server/device/hand.h"
+#include "haptic_server/device/simulated_board.h"
+
+namespace rikiseki::haptic {
+namespace {
+
+SpidarSettings Cube() {
+  SpidarSettings spidar;
+  spidar.motors_m = {Vec3(-0.265, 0.265, 0.265), Vec3(0.265, 0.265, -0.265),
+                     Vec3(-0.265, -0.265, -0.265), Vec3(0.265, -0.265, 0.265)};
+  return spidar;
+}
+
+// A board whose grip the test holds.
+class ScriptedBoard final : public MotorBoard {
+ public:
+  bool ReadCounts(std::int64_t, EncoderCounts& out) noexcept override {
+    out = counts;
+    return answers;
+  }
+  bool WriteTensions(const FourStrings& out) noexcept override {
+    tension = out;
+    return answers;
+  }
+  const Hand* hand() const noexcept override { return nullptr; }
+  std::string Name() const override { return "scripted"; }
+
+  EncoderCounts counts{};
+  FourStrings tension{};
+  bool answers = true;
+};
+
+EncoderCounts CountsAt(const Vec3& position) {
+  const SpidarKinematics kinematics(Cube().motors_m);
+  const PerString home = kinematics.Lengths(Vec3::Zero());
+  const PerString lengths = kinematics.Lengths(position);
+  EncoderCounts counts;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    counts[i] = std::llround((lengths[i] - home[i]) / Cube().count_length_m);
+  }
+  return counts;
+}
+
+TEST_CASE("the SPIDAR measures where the grip is, and how fast") {
+  auto owned = std::make_unique<ScriptedBoard>();
+  ScriptedBoard& board = *owned;
+  Spidar spidar(Cube(), std::move(owned));
+  DeviceSample sample;
+  for (int k = 0; k <= 100; ++k) {
+    const Vec3 position(0.0004 * k, -0.0002 * k, 0);  // 0.4, -0.2 m/s
+    board.counts = CountsAt(position);
+    REQUIRE(spidar.Read(k * 1'000'000, sample) == DeviceStatus::kOk);
+    REQUIRE((sample.position - position).norm() < 27e-6);
+    REQUIRE(sample.target == sample.position);
+  }
+  // One count is 29 mm/s by backward difference; the filter takes most of it away.
+  REQUIRE((sample.velocity - Vec3(0.4, -0.2, 0)).norm() < 0.02);
+}
+
+TEST_CASE("a slipped string and a silent board are faults, and pass") {
+  auto owned = std::make_unique<ScriptedBoard>();
+  ScriptedBoard& board = *owned;
+  Spidar spidar(Cube(), std::move(owned));
+  DeviceSample sample;
+  REQUIRE(spidar.Read(0, sample) == DeviceStatus::kOk);
+  board.counts[1] += 400;  // 12 mm
+  REQUIRE(spidar.Read(1'000'000, sample) == DeviceStatus::kFault);
+  board.counts[1] = std::numeric_limits<std::int64_t>::max();
+  REQUIRE(spidar.Read(2'000'000, sample) == DeviceStatus::kFault);
+  board.counts[1] = 0;
+  REQUIRE(spidar.Read(3'000'000, sample) == DeviceStatus::kOk);
+  REQUIRE(sample.velocity.isZero(0));
+  board.answers = false;
+  REQUIRE(spidar.Read(4'000'000, sample) == DeviceStatus::kFault);
+}
+
+TEST_CASE("Write tells what the strings really display, Release lets go") {
+  auto owned = std::make_unique<ScriptedBoard>();
+  ScriptedBoard& board = *owned;
+  Spidar spidar(Cube(), std::move(owned));
+  DeviceSample sample;
+  spidar.Read(0, sample);
+  REQUIRE((spidar.Write(Vec3(3, 1, -2)) - Vec3(3, 1, -2)).norm() < 1e-11);
+  REQUIRE(spidar.Write(Vec3(500, 0, 0)).norm() < 60);  // at most what the strings hold
+  for (const double t : board.tension) REQUIRE((t >= 0.5 && t <= 20));
+  spidar.Release();
+  for (const double t : board.tension) REQUIRE(t == 0.5);
+}
+
+TEST_CASE("the simulated grip moves as hand and device under the string force") {
+  Settings settings;
+  settings.spidar = Cube();
+  settings.hand.script = HandScript::kRest;
+  settings.hand.home_mm = Vec3(20, -10, 30);
+  const Vec3 home = settings.hand.home_mm * 1e-3;
+  auto device = MakeDevice(settings);
+  DeviceSample sample;
+  const Vec3 force(4, -3, 1);
+  for (std::int64_t k = 0; k < 3000; ++k) {
+    REQUIRE(device->Read(k * 1'000'000, sample) == DeviceStatus::kOk);
+    REQUIRE((device->Write(force) - force).norm() < 1e-11);
+  }
+  REQUIRE((sample.target - home).norm() < 1e-15);
+  // The force is constant while it is allocated anew each millisecond at the measured position:
+  // F/k.
+  REQUIRE((sample.position - home - force / settings.hand.stiffness_n_per_m).norm() < 3e-5);
+}
+
+TEST_CASE("the simulated board keeps to the clock it is given") {
+  Settings settings;
+  settings.spidar = Cube();
+  SimulatedBoard steady(settings.spidar, MakeHand(settings));
+  SimulatedBoard jittery(settings.spidar, MakeHand(settings));
+  EncoderCounts counts{};
+  std::int64_t now = 5'000'000'000;
+  jittery.ReadCounts(now, counts);
+  for (int k = 0; k <= 400; ++k) steady.ReadCounts(7'000'000 + k * 1'000'000, counts);
+  while (now < 5'400'000'000) {
+    now = std::min<std::int64_t>(now + 1'700'000, 5'400'000'000);
+    jittery.ReadCounts(now, counts);
+  }
+  REQUIRE(steady.hand()->now_ns() == 400'000'000);
+  REQUIRE(jittery.hand()->now_ns() == 400'000'000);
+  REQUIRE((steady.hand()->position() - jittery.hand()->position()).norm() < 1e-6);
+}
+
+TEST_CASE("tensions beyond the motors are clamped by the board itself") {
+  Settings settings;
+  settings.spidar = Cube();
+  settings.hand.script = HandScript::kRest;
+  settings.hand.home_mm.setZero();
+  SimulatedBoard asked_too_much(settings.spidar, MakeHand(settings));
+  SimulatedBoard at_limit(settings.spidar, MakeHand(settings));
+  EncoderCounts counts{};
+  asked_too_much.ReadCounts(0, counts);
+  at_limit.ReadCounts(0, counts);
+  asked_too_much.WriteTensions({1000, 0, 0.5, 5});
+  at_limit.WriteTensions({20, 0.5, 0.5, 5});
+  asked_too_much.ReadCounts(50'000'000, counts);
+  at_limit.ReadCounts(50'000'000, counts);
+  REQUIRE(asked_too_much.hand()->position() == at_limit.hand()->position());
+  REQUIRE(at_limit.hand()->position().norm() > 1e-3);
+}
+
+TEST_CASE("a device that cannot be is refused at start") {
+  Settings settings;
+  REQUIRE_THROWS_AS(MakeDevice(settings), StartError);  // no motors
+}
+
+}  // namespace
+}  // namespace rikiseki::haptic

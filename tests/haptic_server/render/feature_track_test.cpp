@@ -1,0 +1,198 @@
+#include "haptic_server/render/feature_track.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+namespace rikiseki::haptic {
+namespace {
+
+constexpr std::int64_t kPeriodNs = 1'000'000;
+
+protocol::Plane PlaneAt(std::uint32_t feature, const Vec3& point, const Vec3& normal) {
+  protocol::Plane plane;
+  plane.body = 3;
+  plane.generation = 1;
+  plane.feature = feature;
+  plane.point = ToArray(point);
+  plane.normal = ToArray(normal);
+  return plane;
+}
+
+protocol::WorldFrame Frame(const std::vector<protocol::Plane>& planes,
+                           std::uint64_t period_ns = 50'000'000) {
+  protocol::WorldFrame frame;
+  frame.period_ns = period_ns;
+  for (const protocol::Plane& plane : planes) frame.planes[frame.plane_count++] = plane;
+  return frame;
+}
+
+const std::array<FingerState, 1> kFarFinger = {FingerState{Vec3(0, 10, 0), 0, 0}};
+
+bool SameBits(const Vec3& a, const Vec3& b) {
+  return (a.array() == b.array()).all();
+}
+
+const Vec3 kPoint0(0.1, 1.0 / 3, -0.07);
+const Vec3 kPoint1(0.1000001, 0.4, 1e-9);
+const Vec3 kNormal0 = Vec3(0.3, 0.9, 0.1).normalized();
+const Vec3 kNormal1 = Vec3(-0.2, 0.8, 0.5).normalized();
+
+TEST_CASE("interpolation shows prev at j = 0 and last at j = n, bit for bit, and stops there") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger);
+  REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint0));
+  REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal0));
+  track.Advance(50);
+  track.Receive(Frame({PlaneAt(1, kPoint1, kNormal1)}), kFarFinger);
+  REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint0));
+  REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal0));
+  for (int j = 1; j < 50; ++j) {
+    track.Advance(1);
+    const HalfSpace shown = track.Surfaces()[0].plane;
+    REQUIRE((shown.point - (kPoint0 + j / 50.0 * (kPoint1 - kPoint0))).norm() < 1e-15);
+    REQUIRE(shown.normal.norm() == Approx(1).epsilon(1e-15));
+    const Vec3 blend = (1 - j / 50.0) * kNormal0 + j / 50.0 * kNormal1;
+    REQUIRE((shown.normal - blend.normalized()).norm() < 1e-14);
+  }
+  for (int j = 50; j < 60; ++j) {
+    track.Advance(1);
+    REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint1));
+    REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal1));
+  }
+}
+
+TEST_CASE("an early frame starts from what is displayed now") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger);
+  track.Advance(50);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}), kFarFinger);
+  track.Advance(20);
+  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.4));
+  track.Receive(Frame({PlaneAt(1, Vec3(2, 0, 0), kNormal0)}, 10'000'000), kFarFinger);
+  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.4));
+  track.Advance(5);
+  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(1.2));
+  track.Advance(3);  // two of them missed
+  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(1.68));
+}
+
+TEST_CASE("hold and extrapolate follow the newest frame") {
+  FeatureTrack hold(DisplayRule::kHold, kPeriodNs);
+  FeatureTrack extrapolate(DisplayRule::kExtrapolate, kPeriodNs);
+  for (FeatureTrack* track : {&hold, &extrapolate}) {
+    track->Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger);
+    track->Advance(50);
+    track->Receive(Frame({PlaneAt(1, Vec3(0.1, 0, 0), kNormal0)}), kFarFinger);
+    REQUIRE(SameBits(track->Surfaces()[0].plane.point, Vec3(0.1, 0, 0)));
+    track->Advance(25);
+  }
+  REQUIRE(SameBits(hold.Surfaces()[0].plane.point, Vec3(0.1, 0, 0)));
+  REQUIRE(extrapolate.Surfaces()[0].plane.point.x() == Approx(0.15));
+  extrapolate.Advance(1000);
+  REQUIRE(extrapolate.Surfaces()[0].plane.point.x() == Approx(0.2));  // stops at n
+}
+
+TEST_CASE("a world faster than the haptic loop, and a fractional n") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}, 100'000), kFarFinger);
+  track.Advance(1);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}, 2'500'000), kFarFinger);
+  track.Advance(2);
+  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.8));
+  track.Advance(1);
+  REQUIRE(track.Surfaces()[0].plane.point.x() == 1);
+}
+
+TEST_CASE("opposite normals give a finite unit normal at every tick") {
+  for (const DisplayRule rule : {DisplayRule::kInterpolate, DisplayRule::kExtrapolate}) {
+    FeatureTrack track(rule, kPeriodNs);
+    track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger);
+    track.Advance(50);
+    track.Receive(Frame({PlaneAt(1, kPoint0, -kNormal0)}), kFarFinger);
+    for (int j = 0; j <= 60; ++j) {
+      REQUIRE(track.Surfaces()[0].plane.normal.norm() == Approx(1).epsilon(1e-14));
+      track.Advance(1);
+    }
+  }
+}
+
+TEST_CASE("identity is body, generation, feature and pointer, not the place in the list") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0), PlaneAt(2, Vec3(2, 0, 0), kNormal0)}),
+                kFarFinger);
+  track.Advance(50);
+  protocol::Plane reborn = PlaneAt(1, Vec3(5, 0, 0), kNormal0);
+  reborn.generation = 2;
+  track.Receive(Frame({reborn, PlaneAt(2, Vec3(2.5, 0, 0), kNormal0)}), kFarFinger);
+  const auto shown = track.Surfaces();
+  REQUIRE(shown.size() == 2);
+  REQUIRE(shown[0].plane.point.x() == 5);  // a new one starts in its place
+  REQUIRE(shown[1].plane.point.x() == 2);  // the old one from where it was
+  REQUIRE(track.Has(3, 2, 0));
+  REQUIRE(track.Has(3, 1, 0));  // feature 2 still is of generation 1
+  track.Receive(Frame({}), kFarFinger);
+  REQUIRE(track.Surfaces().empty());
+  REQUIRE_FALSE(track.Has(3, 1, 0));
+}
+
+TEST_CASE("planes of one identity pair in their order") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.Receive(Frame({PlaneAt(0, Vec3(1, 0, 0), kNormal0), PlaneAt(0, Vec3(2, 0, 0), kNormal1)}),
+                kFarFinger);
+  track.Receive(Frame({PlaneAt(0, Vec3(3, 0, 0), kNormal0), PlaneAt(0, Vec3(4, 0, 0), kNormal1)}),
+                kFarFinger);
+  REQUIRE(track.Surfaces()[0].plane.point.x() == 1);
+  REQUIRE(track.Surfaces()[1].plane.point.x() == 2);
+}
+
+TEST_CASE("a surface that appears above the finger rises to its place without a jump") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  const Vec3 up = Vec3::UnitY();
+  // 8 mm deep with the radius; 1 mm of it was to be expected.
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0, 0.002, 0), 0.01, 0.001}};
+  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger);
+  const auto depth = [&] { return track.Surfaces()[0].plane.point.y() + 0.01 - 0.002; };
+  REQUIRE(depth() == Approx(0.001));
+  double before = depth();
+  for (int k = 1; k <= 100; ++k) {
+    if (k == 30) track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger);
+    track.Advance(1);
+    REQUIRE(depth() > before);
+    REQUIRE(depth() - before < 0.007 / 100 * 1.001);
+    before = depth();
+  }
+  REQUIRE(depth() == Approx(0.008));
+  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up), PlaneAt(2, Vec3(0, -0.0071, 0), up)}), finger);
+  REQUIRE(track.Surfaces()[1].plane.point.y() == -0.0071);  // 0.9 mm deep: a normal approach
+}
+
+TEST_CASE("damaged planes and planes of other pointers are left out") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  std::vector<protocol::Plane> planes;
+  for (const double bad : {std::nan(""), double(INFINITY), 1e300}) {
+    planes.push_back(PlaneAt(1, Vec3(bad, 0, 0), kNormal0));
+    planes.push_back(PlaneAt(1, kPoint0, Vec3(0, bad, 0)));
+    planes.push_back(PlaneAt(1, kPoint0, kNormal0));
+    planes.back().stiffness = bad;
+    planes.push_back(PlaneAt(1, kPoint0, kNormal0));
+    planes.back().damping = bad;
+  }
+  planes.push_back(PlaneAt(1, kPoint0, Vec3::Zero()));
+  planes.push_back(PlaneAt(1, kPoint0, kNormal0));
+  planes.back().stiffness = -1;
+  planes.push_back(PlaneAt(1, kPoint0, kNormal0));
+  planes.back().pointer = 1;
+  planes.push_back(PlaneAt(7, kPoint0, 3 * kNormal0));  // long, but a direction
+  planes.push_back(PlaneAt(8, Vec3(1e-310, 0, 0), kNormal0));
+  track.Receive(Frame(planes), kFarFinger);
+  REQUIRE(track.Surfaces().size() == 2);
+  REQUIRE((track.Surfaces()[0].plane.normal - kNormal0).norm() < 1e-15);
+  REQUIRE(track.Surfaces()[1].plane.point.x() == 0);  // no denormals inside the loop
+  protocol::WorldFrame lying = Frame({});
+  lying.plane_count = 4'000'000'000U;
+  track.Receive(lying, kFarFinger);
+  REQUIRE(track.Surfaces().size() <= protocol::kMaxPlanes);
+}
+
+}  // namespace
+}  // namespace rikiseki::haptic

@@ -1,0 +1,117 @@
+// The tick allocates nothing and locks nothing. This program counts both by standing in for
+// operator new, malloc and pthread_mutex_lock, and shows first that it would notice.
+#include <dlfcn.h>
+#include <pthread.h>
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cstdlib>
+#include <mutex>
+#include <new>
+
+#include "haptic_server/device/spidar.h"
+#include "haptic_server/step.h"
+
+namespace {
+
+std::atomic<long> allocations{0};
+std::atomic<long> locks{0};
+void* volatile sink = nullptr;  // keeps the compiler from leaving an allocation out
+
+}  // namespace
+
+extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: glibc's own name
+
+extern "C" void* malloc(std::size_t size) {
+  allocations.fetch_add(1, std::memory_order_relaxed);
+  return __libc_malloc(size);
+}
+
+extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) {
+  locks.fetch_add(1, std::memory_order_relaxed);
+  using Lock = int (*)(pthread_mutex_t*);
+  static const auto real = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
+  return real(mutex);
+}
+
+void* operator new(std::size_t size) {
+  if (void* memory = malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept {
+  std::free(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  std::free(memory);
+}
+
+namespace rikiseki::haptic {
+namespace {
+
+TEST_CASE("the guard notices new, malloc and a mutex") {
+  long before = allocations;
+  sink = new int(1);
+  REQUIRE(allocations > before);
+  delete static_cast<int*>(sink);
+  before = allocations;
+  sink = std::malloc(8);
+  const long after = allocations;
+  std::free(sink);
+  REQUIRE(after == before + 1);
+  const long locks_before = locks;
+  std::mutex mutex;
+  mutex.lock();
+  mutex.unlock();
+  const long locks_after = locks;
+  REQUIRE(locks_after == locks_before + 1);
+}
+
+TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") {
+  Settings settings;
+  settings.spidar.motors_m = {Vec3(-0.265, 0.265, 0.265), Vec3(0.265, 0.265, -0.265),
+                              Vec3(-0.265, -0.265, -0.265), Vec3(0.265, -0.265, 0.265)};
+  const auto device = MakeDevice(settings);
+  HapticStep step(settings, *device, 1);
+  protocol::HapticTick message;
+  protocol::WorldFrame frame;
+  frame.period_ns = 50'000'000;
+  frame.plane_count = 32;
+  for (std::uint32_t i = 0; i < 32; ++i) {
+    protocol::Plane& plane = frame.planes[i];
+    plane.body = i % 5;
+    plane.feature = i;
+    plane.point = {0.02 + 0.001 * i, 0, 0};
+    plane.normal = {-1, 0.02 * i - 0.3, 0.01 * i};
+  }
+  bool touched = false;
+  long allocated = 0;
+  long locked = 0;
+  for (int k = 0; k < 6000; ++k) {
+    WorldInput world{.epoch = k < 4000 ? 9U : 10U, .ready = k % 3000 < 2900};
+    TickTime time{.start_ns = std::int64_t{k} * 1'000'000,
+                  .previous_duration_ns = k == 0 ? 0 : 1'000'000,
+                  .missed = k % 700 == 0 ? 30 : 0};
+    world.heartbeat_ns = time.start_ns;
+    if (k % 50 == 0) {
+      frame.frame = static_cast<std::uint64_t>(k + 1);
+      frame.acked_epoch = 1;
+      frame.acked_tick = static_cast<std::uint64_t>(k > 10 ? k - 10 : 0);
+      world.frame = &frame;
+    }
+    const long allocations_before = allocations;
+    const long locks_before = locks;
+    step.Tick(time, world, message);
+    allocated += allocations - allocations_before;
+    locked += locks - locks_before;
+    touched = touched || message.pointers[0].reason == protocol::ForceReason::kContact;
+  }
+  const long allocations_before = allocations;
+  step.Stop(message);
+  allocated += allocations - allocations_before;
+  REQUIRE(touched);
+  REQUIRE(allocated == 0);
+  REQUIRE(locked == 0);
+}
+
+}  // namespace
+}  // namespace rikiseki::haptic

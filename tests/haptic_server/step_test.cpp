@@ -1,0 +1,549 @@
+#include "haptic_server/step.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <random>
+#include <tuple>
+#include <vector>
+
+#include "haptic_server/device/hand.h"
+#include "haptic_server/render/ledger.h"
+#include "tests/haptic_server/test_device.h"
+
+namespace rikiseki::haptic {
+namespace {
+
+using protocol::ForceReason;
+using protocol::ImpulseUnits;
+using protocol::PeerState;
+
+constexpr std::int64_t kPeriodNs = 1'000'000;
+constexpr std::uint64_t kOwnEpoch = 4242;
+
+protocol::Plane WallFacing(const Vec3& point, const Vec3& normal, std::uint32_t body = 1) {
+  protocol::Plane plane;
+  plane.body = body;
+  plane.point = ToArray(point);
+  plane.normal = ToArray(normal);
+  return plane;
+}
+
+// A step, its device, its clock, and the frames that a world of 20 Hz hands over.
+struct Bench {
+  explicit Bench(const Settings& used = Settings{}, std::uint64_t own_epoch = kOwnEpoch)
+      : settings(used), step(used, device, own_epoch) {
+    planes = {WallFacing(Vec3::Zero(), -Vec3::UnitX())};
+    device.next.position = Vec3(-0.05, 0, 0);
+  }
+
+  protocol::WorldFrame& NextFrame() {
+    frame = {};
+    frame.frame = ++frame_number;
+    frame.period_ns = 50'000'000;
+    for (const protocol::Plane& plane : planes) frame.planes[frame.plane_count++] = plane;
+    return frame;
+  }
+
+  // One tick; `hand_over` what the world published since.
+  Vec3 Tick(const protocol::WorldFrame* hand_over = nullptr, std::int64_t duration = kPeriodNs,
+            std::int64_t missed = 0) {
+    TickTime time{.start_ns = now_ns, .previous_duration_ns = previous_ns, .missed = missed};
+    if (beats) world.heartbeat_ns = now_ns;
+    world.frame = hand_over;
+    step.Tick(time, world, message);
+    previous_ns = duration;
+    now_ns += duration;
+    return ToVec3(message.pointers[0].force);
+  }
+
+  // Ticks with a frame each 50.
+  Vec3 Run(int ticks) {
+    Vec3 force = Vec3::Zero();
+    for (int i = 0; i < ticks; ++i) force = Tick(ticks_run++ % 50 == 0 ? &NextFrame() : nullptr);
+    return force;
+  }
+
+  Settings settings;
+  TestDevice device;
+  HapticStep step;
+  WorldInput world{.epoch = 9, .ready = true};
+  bool beats = true;
+  std::int64_t now_ns = 1'000'000'000;
+  std::int64_t previous_ns = 0;
+  std::vector<protocol::Plane> planes;
+  std::uint64_t frame_number = 0;
+  int ticks_run = 0;
+  protocol::WorldFrame frame;
+  protocol::HapticTick message;
+};
+
+TEST_CASE("a finger in a wall feels k times the depth of its sphere, and the message says so") {
+  Bench bench;
+  bench.Run(400);
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kNoContact);
+  REQUIRE(bench.step.health().peer_state == PeerState::kLive);
+  for (int i = 0; i < 60; ++i) {  // in slowly: an approach, no surprise
+    bench.device.next.position.x() += 0.0007;
+    bench.device.next.velocity.x() = 0.7;
+    bench.Run(1);
+  }
+  bench.device.next.velocity.setZero();
+  const Vec3 force = bench.Run(20);
+  const double depth = bench.device.next.position.x() + 0.01;
+  REQUIRE(depth == Approx(0.002));
+  REQUIRE((force - Vec3(-2000 * depth, 0, 0)).norm() < 1e-9);
+
+  const protocol::HapticTick& message = bench.message;
+  REQUIRE(message.tick == 479);
+  REQUIRE(message.start_ns == 1'479'000'000);
+  REQUIRE(message.period_ns == 1'000'000);
+  REQUIRE(message.previous_duration_ns == 1'000'000);
+  REQUIRE(message.world_epoch == 9);
+  REQUIRE(message.world_frame == 10);
+  REQUIRE(message.stiffness == 2000);
+  REQUIRE(message.damping == 2);
+  REQUIRE(message.force_cap == 10);
+  REQUIRE(message.pointer_count == 1);
+  REQUIRE(message.pointers[0].reason == ForceReason::kContact);
+  REQUIRE(message.pointers[0].radius == 0.01);
+  REQUIRE(ToVec3(message.pointers[0].position) == bench.device.next.position);
+  REQUIRE(message.channel_count == 1);
+  REQUIRE(message.channels[0].body == 1);
+  REQUIRE(message.channels[0].impulse[0] > 0);
+  // It acts on the wall's surface: at D - r n, where D is one radius in front of it.
+  REQUIRE(ToVec3(message.channels[0].contact_point).norm() < 1e-12);
+  REQUIRE(std::string(bench.step.health().device.data()) == "test device");
+}
+
+TEST_CASE("whatever ends a world, the force fades to zero within the stated bound") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  Bench bench(settings);
+  bench.Run(200);
+  for (int i = 0; i < 60; ++i) {
+    bench.device.next.position.x() += 0.0007;
+    bench.device.next.velocity.x() = 0.7;
+    bench.Run(1);
+  }
+  bench.device.next.velocity.setZero();
+  const double before = bench.Run(90).norm();
+  REQUIRE(before == Approx(4).epsilon(1e-6));
+  bench.Tick(&bench.NextFrame());
+  const std::int64_t last_frame_ns = bench.now_ns - kPeriodNs;
+
+  bool at_once = false;
+  SECTION("silence") {}
+  SECTION("no heartbeat") {
+    bench.beats = false;
+  }
+  SECTION("closed") {
+    bench.world.ready = false;
+    at_once = true;
+  }
+  SECTION("gone") {
+    bench.world = {};
+    at_once = true;
+  }
+  SECTION("replaced") {
+    bench.world.epoch = 10;
+    at_once = true;
+  }
+  const auto bound = static_cast<std::int64_t>(bench.step.health().zero_force_after_ns);
+  REQUIRE(bound == 335'000'000);
+  Vec3 last = bench.device.force;
+  while (!bench.device.force.isZero(0)) {
+    bench.Tick();
+    REQUIRE((bench.device.force - last).norm() <= 5);
+    last = bench.device.force;
+    REQUIRE(bench.now_ns - kPeriodNs - last_frame_ns <= bound);
+    if (at_once) REQUIRE(bench.now_ns - last_frame_ns <= 90'000'000);
+  }
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kWorldLost);
+  for (int i = 0; i < 3; ++i) bench.Tick();
+  if (at_once) REQUIRE(bench.message.channels[0].state == protocol::ChannelState::kClosed);
+  for (int i = 0; i < 100; ++i) {
+    bench.Tick();
+    REQUIRE(bench.device.force.isZero(0));
+  }
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kWorldAbsent);
+}
+
+TEST_CASE(
+    "a loop that stalls, a device that fails and a finger too fast feel nothing, then softly "
+    "again") {
+  Bench bench;
+  bench.Run(300);
+  for (int i = 0; i < 60; ++i) {
+    bench.device.next.position.x() += 0.0007;
+    bench.device.next.velocity.x() = 0.7;
+    bench.Run(1);
+  }
+  bench.device.next.velocity.setZero();
+  bench.Run(20);
+  REQUIRE(bench.device.force.norm() == Approx(4).epsilon(1e-6));
+  ForceReason reason = ForceReason::kContact;
+  SECTION("stall") {
+    bench.Tick(nullptr, 21 * kPeriodNs);
+    bench.Tick(nullptr, kPeriodNs, 20);
+    reason = ForceReason::kLoopFault;
+  }
+  SECTION("device") {
+    bench.device.status = DeviceStatus::kFault;
+    bench.Tick();
+    reason = ForceReason::kDeviceFault;
+  }
+  SECTION("speed") {
+    bench.device.next.velocity = Vec3(0, 1e6, 0);
+    bench.Tick();
+    reason = ForceReason::kOverSpeed;
+  }
+  SECTION("nonsense") {
+    bench.device.next.position.y() = std::nan("");
+    bench.Tick();
+    reason = ForceReason::kNotFinite;
+    REQUIRE(bench.message.pointers[0].position[1] == 0);  // the last sound one
+  }
+  REQUIRE(bench.message.pointers[0].reason == reason);
+  REQUIRE(bench.device.force.isZero(0));
+  REQUIRE(bench.step.health().reason == reason);
+  bench.device.status = DeviceStatus::kOk;
+  bench.device.next.velocity.setZero();
+  bench.device.next.position.y() = 0;
+  bench.Run(2);
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kSoftStart);
+  REQUIRE(bench.device.force.norm() < 0.1);
+  REQUIRE(bench.Run(400).norm() == Approx(4).epsilon(1e-6));
+}
+
+TEST_CASE("Stop lets go and says so; the books take no more") {
+  Bench bench;
+  bench.Run(400);
+  const std::uint64_t tick = bench.message.tick;
+  bench.step.Stop(bench.message);
+  REQUIRE(bench.device.released);
+  REQUIRE(bench.message.tick == tick + 1);
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kStopped);
+  REQUIRE(ToVec3(bench.message.pointers[0].force).isZero(0));
+  REQUIRE(bench.step.health().reason == ForceReason::kStopped);
+}
+
+TEST_CASE("a contact without a channel displays no force") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  Bench bench(settings);
+  bench.Run(200);
+  std::uint32_t body = 1;
+  bool refused = false;
+  // Each frame brings another body at the finger, and this world never acknowledges anything.
+  bench.device.next.position.x() = -0.0099;
+  for (; body < 40 && !refused; ++body) {
+    bench.planes = {WallFacing(Vec3::Zero(), -Vec3::UnitX(), body)};
+    bench.Tick(&bench.NextFrame());
+    for (int i = 0; i < 120; ++i) bench.Tick();  // recovery passes
+    refused = bench.message.pointers[0].reason == ForceReason::kNoChannel;
+    REQUIRE(bench.device.force.isZero(0) == refused);
+  }
+  REQUIRE(body - 1 == protocol::kMaxChannels + 1);
+  REQUIRE(bench.message.channel_count == protocol::kMaxChannels);
+  // A new world starts with all of them.
+  bench.world.epoch = 10;
+  bench.frame_number = 0;
+  for (int i = 0; i < 200; ++i) bench.Tick();
+  bench.ticks_run = 0;
+  bench.planes = {WallFacing(Vec3::Zero(), -Vec3::UnitX(), 1)};
+  REQUIRE(bench.Run(400).norm() > 0.1);
+  REQUIRE(bench.message.channel_count == 1);
+  REQUIRE(bench.message.world_epoch == 10);
+}
+
+// The block of the reference scenario P: exact Coulomb slide, pushed by impulses.
+struct Block {
+  double mass = 0.5, friction = 0.1, x = 0, v = 0;
+
+  void Step(double impulse, double period_s) {
+    v += impulse / mass;
+    const double drag = friction * 9.81;
+    const double dv = drag * period_s;
+    if (std::abs(v) <= dv) {
+      x += v * std::abs(v) / (2 * drag);
+      v = 0;
+    } else {
+      const double sign = v > 0 ? 1 : -1;
+      x += period_s * v - sign * drag * period_s * period_s / 2;
+      v -= sign * dv;
+    }
+  }
+};
+
+TEST_CASE("scenario P with coupling impulse ends where the independent reference says") {
+  struct Row {
+    DisplayRule display;
+    double mass;
+    int phase;
+    double x_final, impulse;
+  };
+  // Computed independently of this project: scenario P, rule EX, Tw 50 ms, kp 2000, kd 0.
+  const Row rows[] = {
+      {DisplayRule::kInterpolate, 0.5, 0, 0.0859998036, 0.20538477},
+      {DisplayRule::kInterpolate, 0.5, 30, 0.0602763131, 0.189901081},
+      {DisplayRule::kInterpolate, 0.5, 40, 0.078648173, 0.198921903},
+      {DisplayRule::kHold, 0.5, 30, 0.0281410465, 0.132167463},
+      {DisplayRule::kHold, 0.5, 40, 0.0650878714, 0.178677365},
+      {DisplayRule::kExtrapolate, 0.5, 30, 0.0205281906, 0.113140992},
+      {DisplayRule::kInterpolate, 2.0, 40, 0.00466179383, 0.203707144},
+      {DisplayRule::kExtrapolate, 2.0, 40, 0.004110783, 0.180734956},
+  };
+  for (const Row& row : rows) {
+    CAPTURE(static_cast<int>(row.display), row.mass, row.phase);
+    Settings settings;
+    settings.render.damping_ns_per_m = 0;
+    settings.render.adhesion = true;
+    settings.render.display = row.display;
+    settings.render.finger_radius_mm = 0;
+    settings.safety.soft_start_ms = 0;
+    settings.safety.force_cap_n = 1e4;
+    settings.safety.slew_limit_n_per_s = 1e9;
+    Bench bench(settings, 0);
+    Hand hand(MotorProgram({.home = Vec3(-0.04, 0, 0),
+                            .strokes = {{Vec3(0.02, 0, 0), 0.12}, {Vec3(-0.04, 0, 0), 0.12}}}),
+              {0.13, 2.2, 50});
+    Block block{.mass = row.mass};
+    bench.device.next.position = hand.position();
+    for (int k = -5; k < 0; ++k) bench.Tick(&bench.NextFrame());  // the world comes to life
+    for (int i = 0; i < 50; ++i) bench.Tick();
+
+    std::int64_t consumed = 0;
+    double all = 0;
+    for (int k = 0; k < 3000; ++k) {
+      const protocol::WorldFrame* frame = nullptr;
+      if (k >= row.phase && (k - row.phase) % 50 == 0) {
+        const std::int64_t total =
+            bench.message.channel_count > 0 ? bench.message.channels[0].impulse[0] : consumed;
+        const double impulse = static_cast<double>(total - consumed) * 1e-12;
+        consumed = total;
+        all += impulse;
+        block.Step(impulse, 0.05);
+        bench.planes = {WallFacing(Vec3(block.x, 0, 0), -Vec3::UnitX())};
+        frame = &bench.NextFrame();
+      }
+      bench.device.next.position = hand.position();
+      const Vec3 force = bench.Tick(frame);
+      hand.Advance(kPeriodNs, force);
+    }
+    REQUIRE(std::abs(block.x - row.x_final) < 1e-9);
+    REQUIRE(std::abs(all - row.impulse) < 1e-8);
+  }
+}
+
+// A world that reads messages as SPEC section 7 wants it: totals, channel by channel, from a
+// baseline.
+class ReadingWorld {
+ public:
+  explicit ReadingWorld(std::uint64_t own_epoch) : epoch(own_epoch) {}
+
+  // Applies or discards everything up to `message` and acknowledges it.
+  void Read(const protocol::HapticTick& message, bool discard, protocol::WorldFrame& frame) {
+    ImpulseUnits delta{};
+    std::map<Key, ImpulseUnits> now;
+    for (std::uint32_t i = 0; i < message.channel_count; ++i) {
+      const protocol::Channel& channel = message.channels[i];
+      const Key key{channel.body, channel.generation, channel.opened_tick};
+      now[key] = channel.impulse;
+      delta = Plus(delta, Minus(channel.impulse, seen_[key]));  // new ones count from zero
+    }
+    seen_ = now;
+    if (!baseline_) {
+      baseline_ = message.tick;
+    } else if (discard || message.world_epoch != epoch) {
+      discarded = Plus(discarded, delta);
+    } else {
+      applied = Plus(applied, delta);
+    }
+    frame.acked_epoch = kOwnEpoch;
+    frame.acked_tick = message.tick;
+    frame.baseline_tick = *baseline_;
+    frame.applied = applied;
+    frame.discarded = discarded;
+  }
+
+  std::uint64_t epoch;
+  ImpulseUnits applied{}, discarded{};
+
+ private:
+  using Key = std::tuple<std::uint32_t, std::uint32_t, std::uint64_t>;
+  std::map<Key, ImpulseUnits> seen_;
+  std::optional<std::uint64_t> baseline_;
+};
+
+TEST_CASE(
+    "the books balance exactly through jitter, lost frames, dying worlds and changing bodies") {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    std::mt19937_64 random(seed);
+    const auto chance = [&](unsigned percent) { return random() % 100 < percent; };
+    Bench bench;
+    auto world = std::make_unique<ReadingWorld>(100);
+    bench.world.epoch = 100;
+    int world_frames = 0;
+    ImpulseUnits applied{}, discarded{};  // by worlds of the past, as far as their frames were seen
+    ImpulseUnits world_applied{}, world_discarded{};
+    std::vector<ImpulseUnits> displayed;
+    std::int64_t acked = -1;
+    Vec3 true_impulse = Vec3::Zero();
+    double time_s = 0;
+    protocol::HapticTick published;  // the newest that the world can see
+    bool alive = true;
+    std::map<std::uint64_t, int> worlds_pushed;
+    for (int k = 0; k < 40'000; ++k) {
+      const protocol::WorldFrame* frame = nullptr;
+      if (k > 0 && alive && k % 25 == 0) {
+        protocol::WorldFrame& next = bench.NextFrame();
+        next.period_ns = 25'000'000;
+        if (world_frames++ > 0) world->Read(published, chance(20), next);
+        if (!chance(30)) frame = &next;  // else overwritten by the next before it was looked at
+      }
+      if (frame != nullptr && frame->acked_epoch != 0) {
+        acked = static_cast<std::int64_t>(frame->acked_tick);
+        world_applied = frame->applied;
+        world_discarded = frame->discarded;
+      }
+      if (alive && chance(100) && random() % 3000 == 0) {  // dies
+        alive = false;
+        bench.world.ready = chance(50);
+      } else if (!alive && random() % 400 == 0) {  // restarts
+        alive = true;
+        applied = Plus(applied, world_applied);
+        discarded = Plus(discarded, world_discarded);
+        world_applied = world_discarded = {};
+        world = std::make_unique<ReadingWorld>(world->epoch + 1);
+        bench.world.epoch = world->epoch;
+        bench.world.ready = true;
+        bench.frame_number = 0;
+        world_frames = 0;
+      }
+      if (k % 500 == 0) {  // other bodies come near
+        bench.planes = {WallFacing(Vec3::Zero(), -Vec3::UnitX(), random() % 6),
+                        WallFacing(Vec3(0, -0.02, 0), Vec3(0.2, 1, 0).normalized(), random() % 6)};
+      }
+      bench.beats = alive;
+      time_s += 1e-3;
+      bench.device.next.position =
+          Vec3(-0.012 + 0.006 * std::sin(7 * time_s), -0.012 + 0.003 * std::sin(3.1 * time_s), 0);
+      bench.device.next.velocity = Vec3(0.042 * std::cos(7 * time_s), 0, 0);
+      const std::int64_t duration =
+          kPeriodNs + static_cast<std::int64_t>(random() % 1'000'001) - 500'000;
+      const Vec3 force = bench.Tick(frame, duration);
+      true_impulse -= force * 1e-9 * static_cast<double>(k + 1 < 40'000 ? duration : kPeriodNs);
+      published = bench.message;
+      if (!force.isZero(0)) ++worlds_pushed[bench.message.world_epoch];
+
+      const protocol::Books& books = bench.step.health().books;
+      displayed.push_back(books.displayed);
+      REQUIRE(books.covered == Plus(books.applied, books.discarded));
+      const ImpulseUnits up_to_ack =
+          acked < 0 ? ImpulseUnits{} : displayed[static_cast<std::size_t>(acked)];
+      REQUIRE(Plus(books.covered, books.peer_lost) == up_to_ack);
+      REQUIRE(books.applied == Plus(applied, world_applied));
+      REQUIRE(books.discarded == Plus(discarded, world_discarded));
+      REQUIRE(bench.message.ground.impulse == books.ground);
+    }
+    const protocol::Books& books = bench.step.health().books;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double booked = 1e-12 * static_cast<double>(Plus(books.displayed, books.ground)[i]);
+      REQUIRE(booked == Approx(true_impulse[static_cast<Eigen::Index>(i)]).margin(1e-11));
+    }
+    REQUIRE(worlds_pushed.size() > 2);
+    REQUIRE(books.applied != ImpulseUnits{});
+    REQUIRE(books.discarded != ImpulseUnits{});
+    REQUIRE(books.peer_lost != ImpulseUnits{});
+  }
+}
+
+TEST_CASE("hostile frames, samples and worlds: finite, capped, slew-limited, zero in time") {
+  for (const std::uint64_t seed : {11U, 12U, 13U, 14U}) {
+    std::mt19937_64 random(seed);
+    const auto chance = [&](unsigned permille) { return random() % 1000 < permille; };
+    const double wild[] = {
+        0,       1e-310, -5e-324, 1e-3, -0.01, 1, 1e6, 1e12, -1.7976931348623157e308, std::nan(""),
+        INFINITY};
+    const auto value = [&] {
+      return chance(50) ? wild[random() % std::size(wild)]
+                        : 0.04 * (static_cast<double>(random() >> 11) * 0x1p-53 - 0.5);
+    };
+    const auto word = [&] { return chance(100) ? random() : random() % 8; };
+    Settings settings;
+    settings.render.adhesion = seed % 2 == 0;
+    settings.render.display = static_cast<DisplayRule>(seed % 3);
+    Bench bench(settings);
+    Vec3 before = Vec3::Zero();
+    std::int64_t frame_ns = bench.now_ns;
+    int felt = 0;
+    bool alive = true;
+    for (int k = 0; k < 60'000; ++k) {
+      protocol::WorldFrame* frame = nullptr;
+      if (random() % 2000 == 0) alive = !alive;
+      if (alive && (k % 20 == 0 || chance(5))) {
+        frame = &bench.NextFrame();
+        frame->period_ns = chance(20) ? random() : 20'000'000;
+        frame->plane_count = chance(10) ? static_cast<std::uint32_t>(random()) : random() % 33;
+        frame->acked_epoch = chance(800) ? kOwnEpoch : word();
+        frame->acked_tick = chance(500) ? static_cast<std::uint64_t>(k) - random() % 50 : word();
+        frame->baseline_tick = word();
+        for (auto* units : {&frame->applied, &frame->discarded}) {
+          for (std::int64_t& unit : *units) unit = static_cast<std::int64_t>(random());
+        }
+        for (protocol::Plane& plane : frame->planes) {
+          plane.pointer = chance(20) ? static_cast<std::uint32_t>(random()) : 0;
+          plane.body = static_cast<std::uint32_t>(word());
+          plane.feature = static_cast<std::uint32_t>(random() % 4);
+          plane.point = {value(), value(), value()};
+          plane.normal = {value(), value(), value()};
+          plane.stiffness = chance(200) ? value() * 1e6 : 0;
+          plane.damping = chance(200) ? value() * 1e3 : 0;
+        }
+        frame_ns = bench.now_ns;
+        if (chance(3)) frame->frame = random();
+      }
+      if (random() % 3000 == 0) {
+        bench.world.epoch = word();
+        bench.frame_number = 0;
+      }
+      bench.beats = alive;
+      bench.world.ready = alive || chance(900);
+      bench.device.status = chance(2) ? DeviceStatus::kFault : DeviceStatus::kOk;
+      bench.device.next.position = Vec3(value(), value(), value());
+      bench.device.next.velocity = chance(10) ? Vec3(value(), value(), value()) : Vec3(0.1, 0, 0);
+      if (!chance(100)) bench.device.next.position = Vec3(0.001, 0.002, 0);
+      const std::int64_t missed = chance(3) ? static_cast<std::int64_t>(random() % 40) : 0;
+      const Vec3 force = bench.Tick(
+          frame, kPeriodNs * (1 + missed) + static_cast<std::int64_t>(random() % 400'000) - 200'000,
+          missed);
+      REQUIRE(force.allFinite());
+      REQUIRE(force.norm() <= settings.safety.force_cap_n);
+      REQUIRE((force - before).norm() <= settings.safety.slew_limit_n_per_s * 1e-3);
+      before = force;
+      felt += force.isZero(0) ? 0 : 1;
+      const auto bound = static_cast<std::int64_t>(bench.step.health().zero_force_after_ns);
+      // This clock jitters by 20 % and skips up to 39 periods at once, which may delay a tick that
+      // much.
+      if (bench.now_ns - frame_ns > bound + 60 * kPeriodNs) REQUIRE(force.isZero(0));
+    }
+    const protocol::HapticHealth& health = bench.step.health();
+    REQUIRE(felt > 2000);
+    REQUIRE(health.largest_force > 1);
+    REQUIRE(health.largest_force <= settings.safety.force_cap_n);
+    REQUIRE(health.largest_force_step <= health.slew_limit * 1e-3);
+  }
+}
+
+TEST_CASE("settings that cannot be safe are refused by the step itself") {
+  TestDevice device;
+  Settings settings;
+  settings.safety.fade_ms = 99;
+  REQUIRE_THROWS_AS(HapticStep(settings, device, 0), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace rikiseki::haptic

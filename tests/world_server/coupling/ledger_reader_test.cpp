@@ -1,0 +1,364 @@
+#include "world_server/coupling/ledger_reader.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <random>
+
+namespace rikiseki::world {
+namespace {
+
+using protocol::Channel;
+using protocol::Coupling;
+using protocol::DiscardReason;
+using protocol::HapticTick;
+using protocol::ImpulseUnits;
+
+constexpr std::uint64_t kOwn = 77;
+constexpr double kNoCap = 1e6;
+
+ImpulseUnits Sum(const ImpulseUnits& a, const ImpulseUnits& b) {
+  ImpulseUnits sum;
+  for (std::size_t i = 0; i < 3; ++i) {
+    sum[i] = static_cast<std::int64_t>(static_cast<std::uint64_t>(a[i]) +
+                                       static_cast<std::uint64_t>(b[i]));
+  }
+  return sum;
+}
+ImpulseUnits Negative(const ImpulseUnits& a) {
+  return {-a[0], -a[1], -a[2]};
+}
+
+ImpulseUnits Discarded(const LedgerBooks& books, DiscardReason reason) {
+  return books.discarded[static_cast<std::size_t>(reason)];
+}
+
+// Two bodies that move (0, 1), one that does not (2).
+LedgerReader MakeReader(Coupling coupling = Coupling::kImpulse, double largest = kNoCap,
+                        std::uint64_t own_epoch = kOwn) {
+  LedgerReader reader(own_epoch, coupling, largest);
+  reader.SetBodies({{1, true}, {1, true}, {1, false}});
+  reader.BeginEpoch(5);
+  return reader;
+}
+
+HapticTick Message(std::uint64_t tick, const std::vector<Channel>& channels,
+                   std::uint64_t world_epoch = kOwn) {
+  HapticTick message;
+  message.tick = tick;
+  message.world_epoch = world_epoch;
+  message.channel_count = static_cast<std::uint32_t>(channels.size());
+  std::copy(channels.begin(), channels.end(), message.channels.begin());
+  return message;
+}
+
+Channel On(std::uint32_t body, std::int64_t x, std::uint64_t opened_tick = 1,
+           std::uint32_t generation = 1) {
+  Channel channel;
+  channel.body = body;
+  channel.generation = generation;
+  channel.opened_tick = opened_tick;
+  channel.impulse = {x, 0, 0};
+  channel.angular_impulse = {0, 2 * x, 0};
+  return channel;
+}
+
+// The haptic side's ledger, as SPEC.md section 7 has it: a channel that is closed stays until its
+// closing tick is acked. Knows what was displayed up to every tick.
+class Writer {
+ public:
+  explicit Writer(unsigned seed) : random_(seed) {
+    for (std::int64_t& axis : start_) axis = any_(random_);
+  }
+
+  HapticTick Next(std::uint64_t acked_tick) {
+    for (auto channel = channels_.begin(); channel != channels_.end();) {
+      const bool gone = channel->closed != 0 && acked_tick >= channel->closed;
+      channel = gone ? channels_.erase(channel) : channel + 1;
+    }
+    if (Chance(0.05) && channels_.size() < protocol::kMaxChannels) {
+      Open open;
+      open.channel =
+          On(static_cast<std::uint32_t>(small_(random_) % 3), 0, tick_, Chance(0.1) ? 9U : 1U);
+      open.channel.pointer = next_pointer_++ % 4;
+      // Several openings in one tick would need different keys; one per tick is enough here.
+      channels_.push_back(open);
+    }
+    ImpulseUnits displayed = shown_.empty() ? start_ : shown_.rbegin()->second;
+    for (Open& open : channels_) {
+      if (open.closed != 0) continue;
+      ImpulseUnits q;
+      for (std::int64_t& axis : q) axis = small_(random_) - 500'000'000;
+      open.channel.impulse = Sum(open.channel.impulse, q);
+      open.channel.angular_impulse = Sum(open.channel.angular_impulse, q);
+      displayed = Sum(displayed, q);
+      if (Chance(0.03)) open.closed = tick_;
+    }
+    shown_[tick_] = displayed;
+    std::vector<Channel> published;
+    for (const Open& open : channels_) published.push_back(open.channel);
+    return Message(tick_++, published);
+  }
+
+  ImpulseUnits Between(std::uint64_t baseline, std::uint64_t tick) const {
+    return Sum(shown_.at(tick), Negative(shown_.at(baseline)));
+  }
+  bool Chance(double probability) { return probability_(random_) < probability; }
+
+ private:
+  struct Open {
+    Channel channel;
+    std::uint64_t closed = 0;
+  };
+  std::mt19937_64 random_;
+  std::uniform_int_distribution<std::int64_t> any_{-1'000'000'000'000, 1'000'000'000'000};
+  std::uniform_int_distribution<std::int64_t> small_{0, 1'000'000'000};
+  std::uniform_real_distribution<double> probability_{0, 1};
+  std::vector<Open> channels_;
+  std::uint64_t tick_ = 1;
+  std::uint32_t next_pointer_ = 0;
+  ImpulseUnits start_{};
+  std::map<std::uint64_t, ImpulseUnits> shown_;
+};
+
+}  // namespace
+
+TEST_CASE("the first message of an epoch is a baseline: nothing of it is owed") {
+  LedgerReader reader = MakeReader();
+  CHECK(reader.acked_epoch() == 0);
+  CHECK(reader.Consume(Message(40, {On(0, 1000)})));
+  CHECK(reader.Take().empty());
+  CHECK(reader.acked_epoch() == 5);
+  CHECK(reader.acked_tick() == 40);
+  CHECK(reader.baseline_tick() == 40);
+  CHECK(reader.Consume(Message(41, {On(0, 1700), On(1, 50, 41)})));
+  const auto owed = reader.Take();
+  REQUIRE(owed.size() == 2);
+  CHECK(owed[0].impulse.x() == Approx(700e-12));
+  CHECK(owed[0].angular_impulse.y() == Approx(1400e-12));
+  CHECK(owed[1].body == 1);
+  CHECK(owed[1].impulse.x() == Approx(50e-12));
+  CHECK(reader.epoch_books().applied == ImpulseUnits{750, 0, 0});
+}
+
+TEST_CASE("a message that is not newer changes nothing") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(10, {On(0, 0)}));
+  reader.Consume(Message(12, {On(0, 100)}));
+  CHECK_FALSE(reader.Consume(Message(12, {On(0, 500)})));
+  CHECK_FALSE(reader.Consume(Message(11, {On(0, 50)})));
+  CHECK(reader.acked_tick() == 12);
+  CHECK(reader.Consume(Message(13, {On(0, 101)})));
+  reader.Take();
+  CHECK(reader.epoch_books().applied == ImpulseUnits{101, 0, 0});
+}
+
+TEST_CASE("a key said twice in one message counts once") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(10, {}));
+  reader.Consume(Message(11, {On(0, 100, 11), On(0, 900, 11)}));
+  reader.Take();
+  CHECK(reader.epoch_books().applied == ImpulseUnits{100, 0, 0});
+}
+
+TEST_CASE("a channel whose past is unknown counts from where it is first seen") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(10, {On(0, 100)}));
+  reader.Consume(Message(11, {}));
+  reader.Consume(Message(12, {On(0, 5000)}));  // opened before, vanished, came back
+  reader.Consume(Message(13, {On(0, 5007)}));
+  reader.Take();
+  CHECK(reader.epoch_books().applied == ImpulseUnits{7, 0, 0});
+}
+
+TEST_CASE("a reopened channel of the same body and pointer starts from zero") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(10, {On(0, 100, 1)}));
+  reader.Consume(Message(11, {On(0, 130, 1), On(0, 4, 11)}));
+  reader.Consume(Message(12, {On(0, 9, 11)}));
+  reader.Take();
+  CHECK(reader.epoch_books().applied == ImpulseUnits{39, 0, 0});
+}
+
+TEST_CASE("differences are modulo 2^64") {
+  constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
+  constexpr std::int64_t kMin = std::numeric_limits<std::int64_t>::min();
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(1, {On(0, kMax - 5)}));
+  Channel wrapped = On(0, kMin + 4);
+  wrapped.angular_impulse = On(0, 0).angular_impulse;
+  wrapped.angular_impulse[1] =
+      static_cast<std::int64_t>(2 * (static_cast<std::uint64_t>(kMax) - 5));
+  HapticTick first = Message(1, {On(1, 0)});
+  first.channels[0] = On(0, kMax - 5);
+  first.channels[0].angular_impulse = wrapped.angular_impulse;
+  reader.BeginEpoch(6);
+  reader.Consume(first);
+  reader.Consume(Message(2, {wrapped}));
+  reader.Take();
+  CHECK(reader.epoch_books().applied == ImpulseUnits{10, 0, 0});
+}
+
+TEST_CASE("applied + discarded is what was displayed, exactly, under loss") {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    for (const double cap : {kNoCap, 0.004}) {
+      Writer writer(seed);
+      LedgerReader reader = MakeReader(Coupling::kImpulse, cap);
+      ImpulseUnits life{};
+      for (std::uint64_t epoch = 1; epoch <= 3; ++epoch) {
+        reader.BeginEpoch(epoch);
+        std::uint64_t acked = 0;
+        for (int i = 0; i < 600; ++i) {
+          const HapticTick message = writer.Next(acked);
+          if (writer.Chance(0.4)) continue;  // lapped
+          REQUIRE(reader.Consume(message));
+          if (!writer.Chance(0.05)) continue;
+          for (const PendingImpulse& owed : reader.Take()) {
+            REQUIRE(owed.body < 2);
+            REQUIRE(owed.impulse.norm() <= cap);
+          }
+          acked = reader.acked_tick();
+          const LedgerBooks& books = reader.epoch_books();
+          REQUIRE(acked == message.tick);
+          REQUIRE(Sum(books.applied, books.TotalDiscarded()) ==
+                  writer.Between(reader.baseline_tick(), acked));
+        }
+        // Nothing may be pending across the epochs for the sums to be comparable.
+        reader.Take();
+        life = Sum(life, Sum(reader.epoch_books().applied, reader.epoch_books().TotalDiscarded()));
+        REQUIRE(Sum(reader.life_books().applied, reader.life_books().TotalDiscarded()) == life);
+      }
+      if (cap == kNoCap) {
+        CHECK(Discarded(reader.life_books(), DiscardReason::kGap) == ImpulseUnits{});
+      } else {
+        CHECK(Discarded(reader.life_books(), DiscardReason::kGap) != ImpulseUnits{});
+      }
+      CHECK(Discarded(reader.life_books(), DiscardReason::kUnknownBody) != ImpulseUnits{});
+    }
+  }
+}
+
+TEST_CASE("losing messages loses no impulse") {
+  // The same channel read at every tick, and at every hundredth, comes to the same.
+  const auto total = [](std::uint64_t stride) {
+    LedgerReader reader = MakeReader();
+    for (std::uint64_t tick = 0; tick <= 1000; tick += stride) {
+      reader.Consume(Message(tick, {On(0, static_cast<std::int64_t>(tick * tick))}));
+    }
+    return reader.Take()[0].impulse.x();
+  };
+  CHECK(total(1) == total(100));
+  CHECK(total(1) == Approx(1e6 * 1e-12).epsilon(1e-15));
+}
+
+TEST_CASE("what was displayed against another world is discarded") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(1, {On(0, 0)}, 66));
+  reader.Consume(Message(2, {On(0, 100)}, 66));
+  reader.Consume(Message(3, {On(0, 130)}, 0));
+  reader.Consume(Message(4, {On(0, 7, 4)}));
+  reader.Take();
+  CHECK(Discarded(reader.epoch_books(), DiscardReason::kForeignWorld) == ImpulseUnits{130, 0, 0});
+  CHECK(reader.epoch_books().applied == ImpulseUnits{7, 0, 0});
+
+  LedgerReader laboratory = MakeReader(Coupling::kImpulse, kNoCap, /*own_epoch=*/0);
+  laboratory.Consume(Message(1, {On(0, 0)}, 66));
+  laboratory.Consume(Message(2, {On(0, 100)}, 66));
+  laboratory.Take();
+  CHECK(laboratory.epoch_books().applied == ImpulseUnits{100, 0, 0});
+}
+
+TEST_CASE("no such body, an old generation, and one that cannot move") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(1, {}));
+  reader.Consume(Message(2, {On(900, 1, 2), On(0, 10, 2, 3), On(2, 100, 2), On(1, 1000, 2)}));
+  const auto owed = reader.Take();
+  REQUIRE(owed.size() == 1);
+  CHECK(owed[0].body == 1);
+  CHECK(Discarded(reader.epoch_books(), DiscardReason::kUnknownBody) == ImpulseUnits{111, 0, 0});
+}
+
+TEST_CASE("position coupling discards every impulse") {
+  LedgerReader reader = MakeReader(Coupling::kPosition);
+  reader.Consume(Message(1, {}));
+  reader.Consume(Message(2, {On(0, 3, 2), On(2, 4, 2)}));
+  CHECK(reader.Take().empty());
+  CHECK(Discarded(reader.epoch_books(), DiscardReason::kCoupling) == ImpulseUnits{7, 0, 0});
+  CHECK(reader.epoch_books().applied == ImpulseUnits{});
+}
+
+TEST_CASE(
+    "after a gap no more than the cap is applied, whole messages, and nothing is carried over") {
+  constexpr std::int64_t kOne = 1'000'000'000'000;  // 1 N s
+  LedgerReader reader = MakeReader(Coupling::kImpulse, 3.5);
+  reader.Consume(Message(1, {On(0, 0)}));
+  for (std::uint64_t tick = 2; tick <= 11; ++tick) {
+    reader.Consume(Message(tick, {On(0, static_cast<std::int64_t>(tick - 1) * kOne / 1)}));
+  }
+  auto owed = reader.Take();
+  REQUIRE(owed.size() == 1);
+  CHECK(owed[0].impulse.x() == Approx(3));
+  CHECK(reader.epoch_books().applied == ImpulseUnits{3 * kOne, 0, 0});
+  CHECK(Discarded(reader.epoch_books(), DiscardReason::kGap) == ImpulseUnits{7 * kOne, 0, 0});
+  // The next world tick starts afresh.
+  reader.Consume(Message(12, {On(0, 11 * kOne)}));
+  CHECK(reader.Take()[0].impulse.x() == Approx(1));
+  // A push there and back is as much pushing as one there.
+  for (std::uint64_t tick = 13; tick <= 22; ++tick) {
+    reader.Consume(Message(tick, {On(0, (tick % 2 == 0 ? 11 : 12) * kOne)}));
+  }
+  reader.Take();
+  CHECK(Discarded(reader.epoch_books(), DiscardReason::kGap) != ImpulseUnits{7 * kOne, 0, 0});
+}
+
+TEST_CASE("what is pending survives a new haptic epoch, and belongs to the old one's books") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(1, {On(0, 0)}));
+  reader.Consume(Message(2, {On(0, 100)}));
+  reader.BeginEpoch(6);
+  CHECK(reader.acked_epoch() == 0);
+  reader.Consume(Message(1, {On(0, 5)}));
+  reader.Consume(Message(2, {On(0, 8)}));
+  CHECK(reader.Take()[0].impulse.x() == Approx(103e-12));
+  CHECK(reader.epoch_books().applied == ImpulseUnits{3, 0, 0});
+  CHECK(reader.life_books().applied == ImpulseUnits{103, 0, 0});
+}
+
+TEST_CASE("what is pending for a scene that goes is declared not applied") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(1, {On(0, 0)}));
+  reader.Consume(Message(2, {On(0, 100)}));
+  reader.SetBodies({{2, true}});
+  CHECK(reader.Take().empty());
+  reader.Consume(Message(3, {On(0, 120)}));  // still the old generation
+  reader.Take();
+  CHECK(Discarded(reader.epoch_books(), DiscardReason::kUnknownBody) == ImpulseUnits{120, 0, 0});
+  CHECK(reader.epoch_books().applied == ImpulseUnits{});
+}
+
+TEST_CASE("random bytes do no harm") {
+  std::mt19937_64 random(3);
+  LedgerReader reader = MakeReader(Coupling::kImpulse, 2.0, /*own_epoch=*/0);
+  for (int round = 0; round < 3000; ++round) {
+    HapticTick message;
+    std::vector<std::uint64_t> noise(sizeof message / 8);
+    for (std::uint64_t& word : noise) word = random();
+    std::memcpy(static_cast<void*>(&message), noise.data(), noise.size() * 8);
+    message.tick = static_cast<std::uint64_t>(round);
+    for (Channel& channel : message.channels) {
+      channel.body %= 4;
+      channel.generation = 1;
+      if (round % 2 == 0) channel.impulse = {round, 0, 0};  // hardly any J, any L
+    }
+    reader.Consume(message);
+    if (round % 5 != 0) continue;
+    for (const PendingImpulse& owed : reader.Take()) {
+      REQUIRE(owed.impulse.norm() <= 2.0);
+      REQUIRE(owed.angular_impulse.norm() <= 20.0);
+    }
+  }
+}
+
+}  // namespace rikiseki::world
