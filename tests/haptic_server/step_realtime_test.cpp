@@ -1,52 +1,19 @@
-// The tick allocates nothing and locks nothing. This program counts both by standing in for
-// operator new, malloc and pthread_mutex_lock, and shows first that it would notice.
-#include <dlfcn.h>
-#include <pthread.h>
-
-#include <atomic>
+// The tick allocates nothing and locks nothing, and the guard that counts both would notice.
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <mutex>
-#include <new>
 
 #include "haptic_server/device/spidar.h"
 #include "haptic_server/step.h"
-
-namespace {
-
-std::atomic<long> allocations{0};
-std::atomic<long> locks{0};
-void* volatile sink = nullptr;  // keeps the compiler from leaving an allocation out
-
-}  // namespace
-
-extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: glibc's own name
-
-extern "C" void* malloc(std::size_t size) {
-  allocations.fetch_add(1, std::memory_order_relaxed);
-  return __libc_malloc(size);
-}
-
-extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  locks.fetch_add(1, std::memory_order_relaxed);
-  using Lock = int (*)(pthread_mutex_t*);
-  static const auto real = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
-  return real(mutex);
-}
-
-void* operator new(std::size_t size) {
-  if (void* memory = malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
+#include "tests/haptic_server/guard.h"
 
 namespace rikiseki::haptic {
 namespace {
+
+using test::allocations;
+using test::locks;
+
+void* volatile sink = nullptr;  // keeps the compiler from leaving an allocation out
 
 TEST_CASE("the guard notices new, malloc and a mutex") {
   long before = allocations;
