@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -83,9 +84,13 @@ std::string SourceFile(const std::string& path) {
   return std::string(RIKISEKI_SOURCE_DIR) + "/" + path;
 }
 
-std::string FreshInstance() {
+Instance::Instance() {
   static std::atomic<int> next{0};
-  return "test-" + std::to_string(getpid()) + "-" + std::to_string(next++);
+  name_ = "test-" + std::to_string(getpid()) + "-" + std::to_string(next++);
+}
+
+Instance::~Instance() {
+  for (const char* role : {".haptic", ".world"}) shm_unlink(("/rikiseki." + name_ + role).c_str());
 }
 
 }  // namespace rikiseki::test

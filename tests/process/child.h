@@ -41,7 +41,18 @@ std::string Program(const std::string& name);
 /// A file of the source tree.
 std::string SourceFile(const std::string& path);
 
-/// An instance name that no other test uses.
-std::string FreshInstance();
+/// An instance name that no other test uses. Removes what killed daemons left under it: declare it before
+/// them.
+class Instance {
+ public:
+  Instance();
+  ~Instance();
+  Instance(const Instance&) = delete;
+  Instance& operator=(const Instance&) = delete;
+  operator const std::string&() const { return name_; }
+
+ private:
+  std::string name_;
+};
 
 }  // namespace rikiseki::test
