@@ -148,6 +148,7 @@ void ConfigSchema::Vectors(const std::string& key, std::vector<Vec3>* target, do
                   while (std::getline(parts, part, ',')) {
                     vectors.push_back(ParseVector(part, low, high));
                   }
+                  if (value.ends_with(',')) throw std::invalid_argument("nothing after the comma");
                   *target = vectors;
                 },
             .show =
@@ -194,13 +195,14 @@ void ConfigSchema::Assign(const std::string& key, const std::string& value,
                       " is expected (the unit is part of the key's name)");
   }
   entry->second.origin = origin;
-  entry->second.text = value;
 }
 
 void ConfigSchema::Load(const std::string& path) {
+  errno = 0;
   std::ifstream file(path);
+  const int open_error = errno;
   if (!file || std::filesystem::is_directory(path)) {
-    const int error = errno != 0 ? errno : EISDIR;
+    const int error = file ? EISDIR : open_error;
     throw ConfigError(path + ": the configuration cannot be read: " + std::strerror(error));
   }
   const std::string folder = std::filesystem::path(path).parent_path().string();
@@ -217,14 +219,14 @@ void ConfigSchema::Load(const std::string& path) {
     const std::string text = Trim(line.substr(0, line.find('#')));
     if (text.empty()) continue;
     if (text.front() == '[') {
-      if (text.back() != ']' || text.size() < 3) {
+      section = text.back() == ']' ? Trim(text.substr(1, text.size() - 2)) : "";
+      if (section.empty()) {
         throw ConfigError(origin + ": " + text + ": a section is written [name]");
       }
-      section = text.substr(1, text.size() - 2);
       continue;
     }
     // The library parses one line at a time, because it does not tell lines in its errors.
-    std::istringstream one_line("[" + section + "]\n" + text + "\n");
+    std::istringstream one_line((section.empty() ? "" : "[" + section + "]\n") + text + "\n");
     po::parsed_options parsed(&known);
     try {
       parsed = po::parse_config_file(one_line, known, /*allow_unregistered=*/true);

@@ -80,7 +80,6 @@ class ConfigSchema {
     std::string expected;  // "a number from 0 to 20"
     std::string doc;
     std::string origin = "default";
-    std::string text = {};
   };
 
   void Add(const std::string& key, Entry entry);

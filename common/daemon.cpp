@@ -44,7 +44,12 @@ DaemonOptions ParseDaemonOptions(int argc, char** argv, const std::string& progr
   }
   po::variables_map values;
   try {
-    po::store(po::parse_command_line(argc, argv, description), values);
+    // No positional arguments: a stray word is refused, not skipped.
+    po::store(po::command_line_parser(argc, argv)
+                  .options(description)
+                  .positional(po::positional_options_description())
+                  .run(),
+              values);
     po::notify(values);
   } catch (const po::error& error) {
     throw StartError(kExitUsage, std::string(error.what()) + "; try --help");

@@ -16,11 +16,11 @@ constexpr int kPerOctave = 8;
 // Bucket 0 holds [0, 1000); bucket 1 + 8 o + s holds 1000 * 2^o * [1 + s/8, 1 + (s+1)/8).
 std::size_t HistogramBucket(std::int64_t duration_ns) noexcept {
   if (duration_ns < kFloorNs) return 0;
+  if (duration_ns >= HistogramLowerEdge(kHistogramSize - 1)) return kHistogramSize - 1;
   const auto octave = std::bit_width(static_cast<std::uint64_t>(duration_ns / kFloorNs)) - 1;
   const std::int64_t base = kFloorNs << octave;
   const auto step = static_cast<int>((duration_ns - base) * kPerOctave / base);
-  const auto bucket = static_cast<std::size_t>(1 + octave * kPerOctave + step);
-  return std::min(bucket, kHistogramSize - 1);
+  return static_cast<std::size_t>(1 + octave * kPerOctave + step);
 }
 
 std::int64_t HistogramLowerEdge(std::size_t bucket) noexcept {

@@ -1,6 +1,7 @@
-// One tick of the haptic loop over plain state: device.read -> feature track -> contact solve -> surface
-// force -> safety -> device.write -> ledger -> (local bodies: issue 3) -> message. The clock, the device
-// and the peer are passed in: the daemon drives it with real time, the laboratory with virtual time.
+// One tick of the haptic loop over plain state: device.read -> feature track -> contact solve ->
+// surface force -> safety -> device.write -> ledger -> (local bodies: issue 3) -> message. The
+// clock, the device and the peer are passed in: the daemon drives it with real time, the laboratory
+// with virtual time.
 #pragma once
 
 #include <cstdint>
@@ -24,14 +25,17 @@ struct WorldInput {
   std::uint64_t epoch = 0;        // of the attached segment; 0 = none
   bool ready = false;             // its owner says so, and lives
   std::int64_t heartbeat_ns = 0;  // its owner's last sign of life
-  const protocol::WorldFrame* frame = nullptr;  // the newest frame, if it was not handed over before
+  const protocol::WorldFrame* frame =
+      nullptr;  // the newest frame, if it was not handed over before
 };
 
 /// The haptic loop's state between ticks. Everything is allocated by the constructor.
 class HapticStep {
  public:
-  /// `device` outlives the step. Throws std::invalid_argument on settings that CheckSettings refuses.
-  HapticStep(const Settings& settings, Device& device);
+  /// `device` outlives the step. `own_epoch` is the epoch of the segment that the messages will be
+  /// published in; frames that acknowledge another one cover nothing. 0 accepts any (the
+  /// laboratory). Throws std::invalid_argument on settings that CheckSettings refuses.
+  HapticStep(const Settings& settings, Device& device, std::uint64_t own_epoch);
   ~HapticStep();
   HapticStep(const HapticStep&) = delete;
   HapticStep& operator=(const HapticStep&) = delete;

@@ -1,5 +1,6 @@
-// What the streams say: the messages as their reader and writer hold them in memory. codec.h packs them
-// into slots; SPEC.md section 6 gives the bytes. SI units, right-handed world axes W, CLOCK_MONOTONIC ns.
+// What the streams say: the messages as their reader and writer hold them in memory. codec.h packs
+// them into slots; SPEC.md section 6 gives the bytes. SI units, right-handed world axes W,
+// CLOCK_MONOTONIC ns.
 #pragma once
 
 #include <array>
@@ -90,7 +91,8 @@ struct GroundChannel {
   ImpulseUnits angular_impulse{};
 };
 
-/// One tick of the haptic loop. Full state, never an event: a reader that missed any number loses nothing.
+/// One tick of the haptic loop. Full state, never an event: a reader that missed any number loses
+/// nothing.
 struct HapticTick {
   std::uint64_t tick = 0;                  // k, from 0, counts performed ticks of this epoch
   std::uint64_t start_ns = 0;              // t_k, when the finger was measured
@@ -111,7 +113,8 @@ struct HapticTick {
 // ---------------------------------------------------------------------------------------------------
 // world.frame
 
-/// A contact plane of one pointer: the tangent plane at a body's nearest point, normal towards the finger.
+/// A contact plane of one pointer: the tangent plane at a body's nearest point, normal towards the
+/// finger.
 struct Plane {
   std::uint32_t pointer = 0;
   std::uint32_t body = 0;
@@ -125,10 +128,10 @@ struct Plane {
 
 /// One world frame: "includes everything up to tick `acked_tick` of haptic epoch `acked_epoch`".
 struct WorldFrame {
-  std::uint64_t frame = 0;        // n, from 1
+  std::uint64_t frame = 0;          // n, from 1
   std::uint64_t world_time_ns = 0;  // simulated time
-  std::uint64_t period_ns = 0;    // nominal, to the next frame
-  std::uint64_t acked_epoch = 0;  // 0 = no haptic side seen
+  std::uint64_t period_ns = 0;      // nominal, to the next frame
+  std::uint64_t acked_epoch = 0;    // 0 = no haptic side seen
   std::uint64_t acked_tick = 0;
   std::uint64_t baseline_tick = 0;  // first tick seen of that epoch: counted from there
   ImpulseUnits applied{};           // of the linear channel totals since the baseline
@@ -182,7 +185,8 @@ struct HapticHealth {
   PeerState peer_state = PeerState::kAbsent;
   std::uint64_t peer_epoch = 0;
   std::uint64_t feature_age_ns = 0;  // of the newest frame
-  std::uint64_t zero_force_after_ns = 0;  // stated bound: from the last frame of a dead world to zero
+  std::uint64_t zero_force_after_ns =
+      0;                          // stated bound: from the last frame of a dead world to zero
   double largest_force = 0;       // N, since the start
   double largest_force_step = 0;  // N, between two ticks
   double slew_limit = 0;          // N/s
@@ -227,7 +231,7 @@ struct WorldHealth {
 struct Body {
   std::uint32_t body = 0;
   std::uint32_t generation = 0;
-  double mass = 0;  // kg; 0 = fixed
+  double mass = 0;    // kg; 0 = fixed
   Vector position{};  // m, centre of mass, in W
   Quaternion orientation{1, 0, 0, 0};
   Vector velocity{};
@@ -237,6 +241,7 @@ struct Body {
 static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 80);
 static_assert(sizeof(Body) == 120);
 static_assert(std::is_trivially_copyable_v<HapticTick> && std::is_trivially_copyable_v<WorldFrame>);
-static_assert(std::is_trivially_copyable_v<HapticHealth> && std::is_trivially_copyable_v<WorldHealth>);
+static_assert(std::is_trivially_copyable_v<HapticHealth> &&
+              std::is_trivially_copyable_v<WorldHealth>);
 
 }  // namespace rikiseki::protocol

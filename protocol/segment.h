@@ -1,5 +1,5 @@
-// The bytes of a segment: header, stream directory and slot header, as SPEC.md sections 3 and 4 give
-// them. Only plain words live here; ring.h and attach.h say how they may be touched.
+// The bytes of a segment: header, stream directory and slot header, as SPEC.md sections 3 and 4
+// give them. Only plain words live here; ring.h and attach.h say how they may be touched.
 #pragma once
 
 #include <bit>
@@ -7,12 +7,12 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "protocol/version.h"
+
 namespace rikiseki::protocol {
 
 inline constexpr std::uint64_t kMagic = 0x494B455349'4B4952ULL;  // "RIKISEKI", little-endian
 inline constexpr std::uint32_t kByteOrderMark = 0x01020304;
-inline constexpr std::uint16_t kVersionMajor = 0;
-inline constexpr std::uint16_t kVersionMinor = 1;
 inline constexpr std::uint32_t kHeaderBytes = 4096;
 inline constexpr std::uint32_t kMaxStreams = 16;
 inline constexpr std::uint32_t kLineBytes = 128;  // two cache lines: the adjacent one is prefetched

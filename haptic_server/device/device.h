@@ -1,5 +1,6 @@
 // The force display as the haptic loop sees it: one measurement in, one force out, every tick.
-// Behind it stand SPIDARs (spidar.h, over simulated or real motor boards) and the laboratory's ideal one.
+// Behind it stand SPIDARs (spidar.h, over simulated or real motor boards) and the laboratory's
+// ideal one.
 #pragma once
 
 #include <cstdint>
@@ -11,14 +12,15 @@ namespace rikiseki::haptic {
 
 enum class DeviceStatus : std::uint8_t {
   kOk,
-  kFault,      // does not answer, or answers nonsense: nothing may be concluded from the sample
+  kFault,  // does not answer, or answers nonsense: nothing may be concluded from the sample
 };
 
 /// Where the finger is, in device coordinates (SI units).
 struct DeviceSample {
   Vec3 position = Vec3::Zero();  // m, centre of the finger
   Vec3 velocity = Vec3::Zero();  // m/s, as estimated by the device's own filter
-  Vec3 target = Vec3::Zero();    // m, where a simulated hand wants to be; the position on real devices
+  Vec3 target =
+      Vec3::Zero();  // m, where a simulated hand wants to be; the position on real devices
 };
 
 class Device {

@@ -1,0 +1,12 @@
+// Log lines of a daemon: through spdlog to stderr, where journald or a terminal takes them. Never from a
+// real-time tick: spdlog formats, allocates and locks in its caller.
+#pragma once
+
+#include <string>
+
+namespace rikiseki {
+
+/// "2026-01-31 12:00:00.000 haptic_server info: ..."; once, before any thread logs.
+void StartLogging(const std::string& program);
+
+}  // namespace rikiseki

@@ -1,0 +1,34 @@
+// The electronics of a SPIDAR: motors that pull with a commanded tension and encoders that count
+// string. Behind it stand the simulated board and, with the USB drivers, the real ones.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "haptic_server/device/tension.h"
+
+namespace rikiseki::haptic {
+
+class Hand;
+
+/// Encoder counts, longer strings count up; all are 0 with the grip in the origin of the device.
+using EncoderCounts = std::array<std::int64_t, kTensionStrings>;
+
+class MotorBoard {
+ public:
+  virtual ~MotorBoard() = default;
+
+  /// Latches and reads the encoders. False if the board does not answer. // RT:
+  virtual bool ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept = 0;
+
+  /// Pulls with `tension` [N] from now on. False if the board does not answer. // RT:
+  virtual bool WriteTensions(const FourStrings& tension) noexcept = 0;
+
+  /// The simulated hand that holds the grip; null where it is a real one.
+  virtual const Hand* hand() const noexcept = 0;
+
+  virtual std::string Name() const = 0;
+};
+
+}  // namespace rikiseki::haptic

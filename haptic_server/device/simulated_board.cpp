@@ -1,0 +1,76 @@
+#include "haptic_server/device/simulated_board.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace rikiseki::haptic {
+namespace {
+
+constexpr std::int64_t kLongestStepNs = 1'000'000;
+
+MotorProgram::Script PushScript(const HandSettings& hand) {
+  const Vec3 home = hand.home_mm * 1e-3;
+  const Vec3 reach = home + hand.stroke_mm * 1e-3;
+  MotorProgram::Script script;
+  script.home = home;
+  if (hand.script == HandScript::kPush) {
+    // The rest comes first: a world that starts beside us is live before the first push.
+    script.strokes = {{home, hand.rest_ms * 1e-3},
+                      {reach, hand.reach_ms * 1e-3},
+                      {reach, hand.hold_ms * 1e-3},
+                      {home, hand.return_ms * 1e-3}};
+    script.repeats = true;
+    script.rest_jitter_s = hand.rest_jitter_ms * 1e-3;
+    script.seed = static_cast<std::uint64_t>(hand.seed);
+  }
+  return script;
+}
+
+}  // namespace
+
+Hand MakeHand(const Settings& settings) {
+  return {MotorProgram(PushScript(settings.hand)),
+          {.mass_kg = settings.hand.mass_kg + settings.spidar.moving_mass_kg,
+           .damping_ns_per_m =
+               settings.hand.damping_ns_per_m + settings.spidar.friction_damping_ns_per_m,
+           .stiffness_n_per_m = settings.hand.stiffness_n_per_m}};
+}
+
+SimulatedBoard::SimulatedBoard(const SpidarSettings& spidar, Hand hand)
+    : kinematics_(spidar.motors_m),
+      home_lengths_(kinematics_.Lengths(Vec3::Zero())),
+      count_length_m_(spidar.count_length_m),
+      bounds_{spidar.tension_min_n, spidar.tension_max_n},
+      hand_(std::move(hand)) {
+  tension_.fill(spidar.tension_min_n);
+}
+
+bool SimulatedBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept {
+  const std::int64_t elapsed = started_ ? std::max<std::int64_t>(now_ns - now_ns_, 0) : 0;
+  const std::int64_t steps = (elapsed + kLongestStepNs - 1) / kLongestStepNs;
+  for (std::int64_t i = 0; i < steps; ++i) {
+    const Vec3 position = hand_.position();
+    Vec3 force = Vec3::Zero();
+    for (std::size_t string = 0; string < kTensionStrings; ++string) {
+      force += (kinematics_.motor(string) - position).stableNormalized() * tension_[string];
+    }
+    hand_.Advance(elapsed * (i + 1) / steps - elapsed * i / steps, force);
+  }
+  started_ = true;
+  now_ns_ = now_ns;
+  const PerString lengths = kinematics_.Lengths(hand_.position());
+  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+    counts[string] = std::llround((lengths[string] - home_lengths_[string]) / count_length_m_);
+  }
+  return true;
+}
+
+bool SimulatedBoard::WriteTensions(const FourStrings& tension) noexcept {
+  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+    tension_[string] = std::clamp(tension[string], bounds_.min_n, bounds_.max_n);
+  }
+  return true;
+}
+
+}  // namespace rikiseki::haptic

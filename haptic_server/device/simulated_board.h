@@ -1,0 +1,38 @@
+// A motor board that is not there, with the physics behind it: four strings, their encoders, and
+// the grip as one body with the simulated hand that holds it.
+#pragma once
+
+#include "haptic_server/device/hand.h"
+#include "haptic_server/device/motor_board.h"
+#include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/settings.h"
+
+namespace rikiseki::haptic {
+
+/// The hand of the settings as it holds the device of the settings: masses and dampings added.
+Hand MakeHand(const Settings& settings);
+
+/// The body moves only when the encoders are read: up to that instant, under the tensions written
+/// last, whose directions are taken anew at least every millisecond. Lengths are rounded to whole
+/// counts and tensions clamped, as hardware would.
+class SimulatedBoard final : public MotorBoard {
+ public:
+  SimulatedBoard(const SpidarSettings& spidar, Hand hand);
+
+  bool ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept override;
+  bool WriteTensions(const FourStrings& tension) noexcept override;
+  const Hand* hand() const noexcept override { return &hand_; }
+  std::string Name() const override { return "simulated SPIDAR"; }
+
+ private:
+  SpidarKinematics kinematics_;
+  PerString home_lengths_;
+  double count_length_m_;
+  TensionBounds bounds_;
+  Hand hand_;
+  FourStrings tension_{};
+  bool started_ = false;
+  std::int64_t now_ns_ = 0;
+};
+
+}  // namespace rikiseki::haptic

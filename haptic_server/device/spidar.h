@@ -1,0 +1,41 @@
+// A 4-string SPIDAR as a force display: counts -> lengths -> position, force -> tensions, over a
+// motor board. Watches that the strings agree with each other: a slack or slipped one is a fault.
+#pragma once
+
+#include <memory>
+
+#include "haptic_server/device/device.h"
+#include "haptic_server/device/motor_board.h"
+#include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/settings.h"
+
+namespace rikiseki::haptic {
+
+/// Four strings fix a point with one length to spare; if that one is off by more than this [m], a
+/// string hangs slack or its pulley slipped. Quantisation accounts for less than one count.
+inline constexpr double kSlipResidual = 1e-3;
+
+class Spidar final : public Device {
+ public:
+  Spidar(const SpidarSettings& settings, std::unique_ptr<MotorBoard> board);
+
+  DeviceStatus Read(std::int64_t now_ns, DeviceSample& sample) noexcept override;
+  Vec3 Write(const Vec3& force) noexcept override;
+  void Release() noexcept override;
+  std::string Name() const override;
+
+ private:
+  SpidarSettings settings_;
+  std::unique_ptr<MotorBoard> board_;
+  SpidarKinematics kinematics_;
+  PerString home_lengths_;
+  bool moving_ = false;  // a sample came before: velocity can be estimated
+  std::int64_t read_ns_ = 0;
+  Vec3 position_ = Vec3::Zero();
+  Vec3 velocity_ = Vec3::Zero();
+};
+
+/// The device of the settings. Throws StartError if it cannot be had.
+std::unique_ptr<Device> MakeDevice(const Settings& settings);
+
+}  // namespace rikiseki::haptic

@@ -1,0 +1,50 @@
+// String lengths -> position of the grip, for strings that meet in one point.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "common/geometry.h"
+
+namespace rikiseki::haptic {
+
+inline constexpr std::size_t kMaxStrings = 8;
+
+/// One value per string; the first StringCount() count.
+using PerString = std::array<double, kMaxStrings>;
+
+class SpidarKinematics {
+ public:
+  struct Fix {
+    Vec3 position = Vec3::Zero();  // m, device axes
+    double residual_m = 0;  // largest length that this position leaves unexplained: slack or slip
+    int iterations = 0;
+  };
+
+  /// `motors` [m, device axes]: 4 to 8 string exits, not all in one plane. Throws
+  /// std::invalid_argument.
+  explicit SpidarKinematics(const std::vector<Vec3>& motors);
+
+  std::size_t StringCount() const noexcept { return count_; }
+  const Vec3& motor(std::size_t string) const noexcept { return motors_[string]; }
+
+  /// The string lengths [m] of a grip position. // RT:
+  PerString Lengths(const Vec3& position) const noexcept;
+
+  /// The position that explains the lengths best (least squares). The differences of squared
+  /// lengths are linear in the position, which gives a start from anywhere that is exact for
+  /// consistent lengths; at most 3 Gauss-Newton steps then spread what quantisation left. Has no
+  /// memory. // RT:
+  Fix Solve(const PerString& lengths) const noexcept;
+
+ private:
+  std::size_t count_;
+  std::array<Vec3, kMaxStrings> motors_;
+  Vec3 mean_motor_;
+  double mean_motor_square_ = 0;
+  // (sum of a a^T)^-1 a_i with a_i = 2 (mean - motor_i): the linear start.
+  std::array<Vec3, kMaxStrings> linear_;
+};
+
+}  // namespace rikiseki::haptic

@@ -1,0 +1,64 @@
+// The haptic loop around its step: wakes at the haptic rate, reads the newest world frame, runs the tick,
+// publishes it. The thread that runs it may be real-time, so nothing below allocates, locks, logs or
+// throws.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "haptic_server/settings.h"
+#include "haptic_server/step.h"
+#include "protocol/owner.h"
+#include "protocol/peer_link.h"
+#include "protocol/stream.h"
+
+namespace rikiseki::haptic {
+
+class HapticLoop {
+ public:
+  /// All outlive the loop.
+  HapticLoop(const Settings& settings, HapticStep& step, protocol::SegmentOwner& owner,
+             protocol::PeerLink& link);
+
+  /// What the scheduler gave; shown to whoever asks for health.
+  void SetScheduling(const protocol::Scheduling& scheduling) { scheduling_ = scheduling; }
+
+  /// Ticks until told to stop, then lets the device go. // RT:
+  void Run(const std::atomic<bool>& stop) noexcept;
+
+  /// One tick at `now_ns`, which was due at `deadline_ns`; `missed` deadlines were skipped before. // RT:
+  void Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) noexcept;
+
+  /// The last tick: the device is let go. // RT:
+  void Stop() noexcept;
+
+  /// Why the force is what it is; for the supervisor, from any thread.
+  protocol::ForceReason reason() const noexcept { return reason_.load(std::memory_order_relaxed); }
+
+ private:
+  WorldInput ReadWorld() noexcept;
+  void PublishTick() noexcept;
+  void PublishHealth() noexcept;
+
+  const std::int64_t period_ns_;
+  const std::uint64_t health_every_;  // ticks
+  HapticStep& step_;
+  protocol::SegmentOwner& owner_;
+  protocol::PeerLink& link_;
+
+  protocol::MessageWriter<protocol::HapticTick> ticks_;
+  protocol::MessageWriter<protocol::HapticHealth> healths_;
+  protocol::MessageReader<protocol::WorldFrame> frames_;
+
+  protocol::HapticTick tick_;
+  protocol::WorldFrame frame_;
+  protocol::HapticHealth health_;
+  protocol::Histogram lateness_{};
+  protocol::Histogram duration_{};
+  protocol::Scheduling scheduling_;
+  std::atomic<protocol::ForceReason> reason_{protocol::ForceReason::kWorldAbsent};
+  std::int64_t previous_start_ns_ = 0;
+  std::uint64_t performed_ = 0;
+};
+
+}  // namespace rikiseki::haptic

@@ -1,0 +1,135 @@
+// haptic_server: owns the force display and closes its force loop at 1 kHz.
+#include <sched.h>
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <cstdio>
+
+#include "common/clock.h"
+#include "common/daemon.h"
+#include "common/logging.h"
+#include "common/realtime.h"
+#include "common/version.h"
+#include "haptic_server/device/spidar.h"
+#include "haptic_server/loop.h"
+#include "protocol/describe.h"
+
+namespace {
+
+using namespace rikiseki;          // NOLINT(google-build-using-namespace)
+using namespace rikiseki::haptic;  // NOLINT(google-build-using-namespace)
+
+constexpr int kSupervisorPollMs = 100;
+constexpr std::uint64_t kHealthPeriodNs = 10'000'000;
+
+// A world that publishes late by as much as its period must not be lapped (SPEC.md 6.1).
+std::uint32_t TickSlots(const Settings& settings) {
+  const auto longest_ns = static_cast<std::uint64_t>(settings.loop.longest_world_period_ms * 1e6);
+  return protocol::HapticTickSlots(longest_ns, longest_ns,
+                                   static_cast<std::uint64_t>(settings.period_ns()));
+}
+
+// Says what the machine gave, and refuses to run with less where the settings insist.
+protocol::Scheduling JudgeRealtime(const Settings& settings, const RealtimeObtained& obtained,
+                                   const std::string& memory_refusal) {
+  spdlog::info("loop thread: {}{}", PolicyName(obtained.policy, obtained.priority),
+               memory_refusal.empty() ? ", memory locked" : "");
+  for (const std::string& refusal : {obtained.refusal, memory_refusal}) {
+    if (refusal.empty()) continue;
+    if (settings.loop.realtime == RealtimePolicy::kEnforce) {
+      throw StartError(kExitConfig, "loop.realtime = enforce, but " + refusal);
+    }
+    spdlog::warn("not real-time: {}", refusal);
+  }
+  return {.policy = static_cast<std::uint32_t>(obtained.policy),
+          .priority = static_cast<std::uint32_t>(obtained.priority),
+          .memory_locked = memory_refusal.empty() ? 1U : 0U,
+          .cpu = static_cast<std::uint32_t>(obtained.cpu)};
+}
+
+// Contact, its limits and its absence: what happens all the time and is not worth a line.
+bool IsRendering(protocol::ForceReason reason) {
+  return reason <= protocol::ForceReason::kSoftStart;
+}
+
+// Logs what changed, for the tick may not; ends on SIGINT or SIGTERM.
+void Supervise(const HapticLoop& loop, protocol::PeerLink& link) {
+  protocol::ForceReason logged = protocol::ForceReason::kNoContact;
+  while (true) {
+    const int signal = WaitForSignal(kSupervisorPollMs);
+    if (signal == SIGINT || signal == SIGTERM) return;
+    if (signal == SIGHUP) spdlog::info("SIGHUP: haptic_server takes changed settings at a restart");
+    for (const std::string& line : link.PollNews()) spdlog::info("world: {}", line);
+    const protocol::ForceReason reason = loop.reason();
+    if (IsRendering(reason) && IsRendering(logged)) continue;
+    if (reason != logged) spdlog::info("force: {}", protocol::Describe(reason));
+    logged = reason;
+  }
+}
+
+int Run(int argc, char** argv) {
+  const DaemonOptions options =
+      ParseDaemonOptions(argc, argv, "haptic_server", "the device daemon of Rikiseki",
+                         {{"device", "simulated", "wins over device.kind"}});
+  std::vector<std::string> overrides = options.set;
+  if (!options.extra[0].empty()) overrides.push_back("device.kind=" + options.extra[0]);
+  std::string description;
+  const Settings settings = LoadSettings(options.config, overrides, &description);
+  StartLogging("haptic_server");
+  if (options.check) {
+    std::fputs(description.c_str(), stdout);
+    return kExitOk;
+  }
+  BlockSignals();
+  const std::unique_ptr<Device> device = MakeDevice(settings);
+  const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
+  protocol::SegmentOwner owner(
+      {.instance = options.instance,
+       .role = protocol::Role::kHaptic,
+       .streams = protocol::HapticStreams(period_ns, TickSlots(settings), kHealthPeriodNs),
+       .build = kBuild,
+       .runtime_directory = ""});
+  for (const std::string& note : owner.notes()) spdlog::info("{}", note);
+  protocol::PeerLink link(
+      {.peer = {.instance = options.instance,
+                .role = protocol::Role::kWorld,
+                .required = {{.type = protocol::StreamType::kWorldFrame}},
+                .owners = {}}});
+  HapticStep step(settings, *device, owner.epoch());
+  HapticLoop loop(settings, step, owner, link);
+
+  const std::string memory_refusal = LockMemory();
+  std::atomic<bool> go{false};
+  std::atomic<bool> stop{false};
+  RealtimeThread thread({.fifo_priority = settings.loop.fifo_priority, .cpu = settings.loop.cpu},
+                        [&] {
+                          while (!go && !stop) SleepUntil(MonotonicNow() + 1'000'000);
+                          if (!stop) loop.Run(stop);
+                        });
+  try {
+    loop.SetScheduling(JudgeRealtime(settings, thread.obtained(), memory_refusal));
+    go = true;
+    spdlog::info("{} at {} Hz on {}, build {}", owner.name(), settings.loop.rate_hz, device->Name(),
+                 kBuild);
+    Supervise(loop, link);
+  } catch (...) {
+    stop = true;
+    throw;
+  }
+  stop = true;
+  thread.Join();
+  spdlog::info("stopped, the device is released");
+  return kExitOk;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return RunProgram("haptic_server", [&] {
+    try {
+      return Run(argc, argv);
+    } catch (const protocol::SegmentError& error) {
+      throw StartError(error.exit_code(), error.what());
+    }
+  });
+}

@@ -1,0 +1,158 @@
+#include "haptic_server/render/feature_track.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rikiseki::haptic {
+namespace {
+
+constexpr double kZeroNormal = 1e-12;
+constexpr double kUnitRounding = 1e-12;
+constexpr double kLargestStiffness = 1e8;  // N/m; damping alike
+constexpr std::int64_t kLongestFrameNs = 10'000'000'000;
+
+// Denormal numbers mean nothing in metres and cost a slow path in the processor.
+Vec3 WithoutDenormals(const Vec3& v) {
+  return v.unaryExpr(
+      [](double x) { return std::abs(x) < std::numeric_limits<double>::min() ? 0.0 : x; });
+}
+
+bool IsPlace(const Vec3& v) {
+  return v.cwiseAbs().maxCoeff() <= kLargestCoordinate && v.allFinite();
+}
+
+bool IsSound(const protocol::Plane& plane) {
+  const Vec3 normal = ToVec3(plane.normal);
+  return IsPlace(ToVec3(plane.point)) && IsPlace(normal) && normal.norm() >= kZeroNormal &&
+         plane.stiffness >= 0 && plane.stiffness <= kLargestStiffness && plane.damping >= 0 &&
+         plane.damping <= kLargestStiffness;
+}
+
+// Unit normals pass bit for bit.
+Vec3 Unit(const Vec3& normal) {
+  const double length = normal.norm();
+  return std::abs(length - 1) <= kUnitRounding ? normal : Vec3(normal / length);
+}
+
+bool SameFeature(const protocol::Plane& a, const protocol::Plane& b) {
+  return a.pointer == b.pointer && a.body == b.body && a.generation == b.generation &&
+         a.feature == b.feature;
+}
+
+}  // namespace
+
+FeatureTrack::FeatureTrack(DisplayRule rule, std::int64_t period_ns)
+    : rule_(rule), period_ns_(period_ns) {}
+
+void FeatureTrack::Advance(std::int64_t ticks) noexcept {
+  // n is below 1e10/1e3; beyond n more ticks change nothing, so j need not run on.
+  tick_ = std::min<std::int64_t>(tick_ + std::max<std::int64_t>(ticks, 0), 1'000'000'000);
+  const double recovered =
+      static_cast<double>(ticks) * static_cast<double>(period_ns_) * 1e-9 / kRecoveryTime;
+  for (std::size_t i = 0; i < count_; ++i) {
+    features_[i].recovery_left = std::max(0.0, features_[i].recovery_left - recovered);
+  }
+}
+
+HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
+  const double fraction = static_cast<double>(tick_) / ticks_per_frame_;
+  const bool at_end = fraction >= 1;
+  const double s = at_end ? 1 : fraction;
+  if (rule_ == DisplayRule::kHold || (rule_ == DisplayRule::kInterpolate && at_end) ||
+      (rule_ == DisplayRule::kExtrapolate && tick_ == 0)) {
+    return {feature.last_point, feature.last_normal};
+  }
+  if (rule_ == DisplayRule::kInterpolate && tick_ == 0) {
+    return {feature.previous_point, feature.previous_normal};
+  }
+  const bool extrapolate = rule_ == DisplayRule::kExtrapolate;
+  const Vec3& base_point = extrapolate ? feature.last_point : feature.previous_point;
+  const Vec3& base_normal = extrapolate ? feature.last_normal : feature.previous_normal;
+  HalfSpace shown;
+  shown.point = base_point + s * (feature.last_point - feature.previous_point);
+  shown.normal = base_normal + s * (feature.last_normal - feature.previous_normal);
+  const double length = shown.normal.norm();
+  // Opposite normals meet in zero half-way: the newer one is as good as any, and a unit vector.
+  shown.normal = length > 1e-6 ? Vec3(shown.normal / length) : feature.last_normal;
+  return shown;
+}
+
+void FeatureTrack::Receive(const protocol::WorldFrame& frame,
+                           std::span<const FingerState> fingers) noexcept {
+  std::array<bool, protocol::kMaxPlanes> paired{};
+  std::size_t count = 0;
+  const std::size_t planes = std::min<std::size_t>(frame.plane_count, protocol::kMaxPlanes);
+  for (std::size_t i = 0; i < planes; ++i) {
+    const protocol::Plane& plane = frame.planes[i];
+    if (plane.pointer >= fingers.size() || !IsSound(plane)) continue;
+    Feature& feature = incoming_[count++];
+    feature.identity = plane;
+    feature.last_point = WithoutDenormals(ToVec3(plane.point));
+    feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));
+    // Several planes of one identity pair in their order.
+    std::size_t before = 0;
+    while (before < count_ && (paired[before] || !SameFeature(features_[before].identity, plane))) {
+      ++before;
+    }
+    if (before < count_) {
+      paired[before] = true;
+      const Feature& known = features_[before];
+      const HalfSpace now = rule_ == DisplayRule::kInterpolate
+                                ? Displayed(known)
+                                : HalfSpace{known.last_point, known.last_normal};
+      feature.previous_point = now.point;
+      feature.previous_normal = now.normal;
+      feature.recovery = known.recovery;
+      feature.recovery_left = known.recovery_left;
+    } else {
+      feature.previous_point = feature.last_point;
+      feature.previous_normal = feature.last_normal;
+      const FingerState& finger = fingers[plane.pointer];
+      const double depth =
+          feature.last_normal.dot(feature.last_point - finger.position) + finger.radius;
+      feature.recovery = depth > finger.allowed_depth ? depth - finger.allowed_depth : 0;
+      feature.recovery_left = 1;
+    }
+  }
+  std::copy_n(incoming_.begin(), count, features_.begin());
+  count_ = count;
+  tick_ = 0;
+  const std::int64_t frame_ns = static_cast<std::int64_t>(
+      std::min<std::uint64_t>(frame.period_ns, std::uint64_t{kLongestFrameNs}));
+  ticks_per_frame_ =
+      std::max(static_cast<double>(frame_ns) / static_cast<double>(period_ns_), 1e-9);
+}
+
+void FeatureTrack::Clear() noexcept {
+  count_ = 0;
+  tick_ = 0;
+}
+
+std::span<const Surface> FeatureTrack::Surfaces() noexcept {
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Feature& feature = features_[i];
+    Surface& surface = surfaces_[i];
+    surface.pointer = feature.identity.pointer;
+    surface.body = feature.identity.body;
+    surface.generation = feature.identity.generation;
+    surface.stiffness = feature.identity.stiffness;
+    surface.damping = feature.identity.damping;
+    surface.plane = Displayed(feature);
+    const double below = feature.recovery * feature.recovery_left;
+    if (below > 0) surface.plane.point -= below * surface.plane.normal;
+  }
+  return std::span(surfaces_).first(count_);
+}
+
+bool FeatureTrack::Has(std::uint32_t body, std::uint32_t generation,
+                       std::uint32_t pointer) const noexcept {
+  return std::any_of(features_.begin(), features_.begin() + static_cast<std::ptrdiff_t>(count_),
+                     [=](const Feature& feature) {
+                       return feature.identity.body == body &&
+                              feature.identity.generation == generation &&
+                              feature.identity.pointer == pointer;
+                     });
+}
+
+}  // namespace rikiseki::haptic

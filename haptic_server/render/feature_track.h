@@ -1,0 +1,82 @@
+// What the world sent becomes what is shown: features keep their identity from frame to frame and
+// move between frames by the display rule. Paper 3.1 and 3.2; numerics 1.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "common/geometry.h"
+#include "haptic_server/render/contact_solve.h"
+#include "haptic_server/settings.h"
+#include "protocol/messages.h"
+
+namespace rikiseki::haptic {
+
+/// A feature that appears with the finger already inside it starts below the finger and rises to
+/// its place within this time [s], so that the force does not step (Mark 1996: recovery time).
+inline constexpr double kRecoveryTime = 0.1;
+
+/// Coordinates beyond this [m] are taken for damage, not for places.
+inline constexpr double kLargestCoordinate = 1e12;
+
+/// A plane as it is displayed in one tick.
+struct Surface {
+  std::uint32_t pointer = 0;
+  std::uint32_t body = 0;
+  std::uint32_t generation = 0;
+  double stiffness = 0;  // N/m; 0 = it brings none of its own
+  double damping = 0;    // N s/m, used only where stiffness > 0
+  HalfSpace plane;       // unit normal
+};
+
+/// Where a finger is when a frame arrives: decides which new features need recovery.
+struct FingerState {
+  Vec3 position = Vec3::Zero();  // m, centre
+  double radius = 0;             // m
+  double allowed_depth = 0;      // m, a new feature this deep is no surprise
+};
+
+class FeatureTrack {
+ public:
+  FeatureTrack(DisplayRule rule, std::int64_t period_ns);
+
+  /// Time passes: j grows by `ticks`. Once per tick, before Receive. // RT:
+  void Advance(std::int64_t ticks) noexcept;
+
+  /// A frame arrived, to be shown from this tick on (j = 0). `fingers` by pointer index; planes of
+  /// other pointers and damaged planes are ignored. // RT:
+  void Receive(const protocol::WorldFrame& frame, std::span<const FingerState> fingers) noexcept;
+
+  /// Forgets everything: the world is gone. // RT:
+  void Clear() noexcept;
+
+  /// What is displayed in this tick; valid until the next call of a member. // RT:
+  std::span<const Surface> Surfaces() noexcept;
+
+  /// Whether the newest frame has a feature of this body near this pointer. // RT:
+  bool Has(std::uint32_t body, std::uint32_t generation, std::uint32_t pointer) const noexcept;
+
+ private:
+  struct Feature {
+    protocol::Plane identity;  // and own stiffness
+    Vec3 previous_point, last_point;
+    Vec3 previous_normal, last_normal;
+    double recovery = 0;       // m, how far below its place it started
+    double recovery_left = 0;  // 1..0
+  };
+
+  HalfSpace Displayed(const Feature& feature) const noexcept;
+
+  DisplayRule rule_;
+  std::int64_t period_ns_;
+  double ticks_per_frame_ = 1;  // n
+  std::int64_t tick_ = 0;       // j
+  std::size_t count_ = 0;
+  std::array<Feature, protocol::kMaxPlanes> features_;
+  std::array<Feature, protocol::kMaxPlanes> incoming_;
+  std::array<Surface, protocol::kMaxPlanes> surfaces_;
+};
+
+}  // namespace rikiseki::haptic

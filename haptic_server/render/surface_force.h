@@ -1,0 +1,66 @@
+// The spring and damper between the finger and its proxy, shared out over the bodies that push.
+// Paper 3.3; numerics 1.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "common/geometry.h"
+#include "haptic_server/render/contact_solve.h"
+#include "haptic_server/render/feature_track.h"
+#include "haptic_server/settings.h"
+
+namespace rikiseki::haptic {
+
+/// What one body does to the finger in this tick.
+struct BodyShare {
+  std::uint32_t body = 0;
+  std::uint32_t generation = 0;
+  Vec3 force = Vec3::Zero();  // N, on the user
+  Vec3 point = Vec3::Zero();  // m, where the opposite impulse acts on the body: D - r n
+};
+
+inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
+
+/// The contact law of one pointer. For body b with e_b = sum of its multiplier_i * normal_i, so
+/// that the e_b add up to e = D - C:  f_b = sum of k_i multiplier_i normal_i + d_b (e_b - e_b of
+/// the tick before)/T. With equal k and d this is the paper's f = k e + d (e - e_before)/T, split
+/// without remainder. Without `adhesion` a body only pushes: f_b is dropped where f_b . e_b <= 0,
+/// and when the finger is free.
+class SurfaceForce {
+ public:
+  SurfaceForce(const RenderSettings& settings, double period_s);
+
+  /// `elapsed_ticks` is 1, or more after missed deadlines: the difference quotient runs over that
+  /// many *nominal* periods, so that jitter of the wake-up does not become jitter of the force. //
+  /// RT:
+  std::span<const BodyShare> Update(std::span<const Surface> surfaces,
+                                    const ContactSolution& contact, double radius,
+                                    std::int64_t elapsed_ticks) noexcept;
+
+  /// The finger is free, whatever came before. // RT:
+  void Reset() noexcept { count_ = 0; }
+
+ private:
+  struct BodyContact {
+    std::uint32_t body = 0;
+    std::uint32_t generation = 0;
+    double damping = 0;
+    Vec3 displacement = Vec3::Zero();  // e_b
+    Vec3 spring = Vec3::Zero();        // N
+    Vec3 point = Vec3::Zero();
+    double weight = 0;
+  };
+
+  double stiffness_;
+  double damping_;
+  bool adhesion_;
+  double period_s_;
+  std::size_t count_ = 0;
+  std::array<BodyContact, kMaxContactPlanes> contacts_;  // of the tick before
+  std::array<BodyShare, kMaxShares> shares_;
+};
+
+}  // namespace rikiseki::haptic

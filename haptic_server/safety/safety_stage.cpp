@@ -1,0 +1,118 @@
+#include "haptic_server/safety/safety_stage.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/clock.h"
+#include "haptic_server/safety/peer_watch.h"
+
+namespace rikiseki::haptic {
+namespace {
+
+using protocol::ForceReason;
+using protocol::PeerState;
+
+// Limits are kept a hair below, so that rounding cannot lift a result above them.
+constexpr double kBelow = 1 - 1e-14;
+
+// What a device may leave of a command before the tension limit is named as the reason.
+constexpr double kMissedFraction = 0.01;
+constexpr double kMissedForce = 0.05;  // N
+
+bool Shorten(Vec3& v, double limit) {
+  const double length = v.stableNorm();
+  if (length <= limit) return false;
+  v *= limit * kBelow / length;
+  return true;
+}
+
+}  // namespace
+
+SafetyStage::SafetyStage(const Settings& settings)
+    : settings_(settings.safety),
+      period_s_(Seconds(settings.period_ns())),
+      largest_step_n_(settings.safety.slew_limit_n_per_s * period_s_ * kBelow),
+      fault_after_misses_(settings.loop.fault_after_misses) {}
+
+ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
+  missed_in_a_row_ = input.missed > 0 ? missed_in_a_row_ + input.missed : 0;
+  if (missed_in_a_row_ >= fault_after_misses_) return ForceReason::kLoopFault;
+  if (!input.device_ok) return ForceReason::kDeviceFault;
+  if (!input.sample_finite || !input.wanted.allFinite()) return ForceReason::kNotFinite;
+  if (!(input.speed <= settings_.speed_limit_m_per_s)) return ForceReason::kOverSpeed;
+  return ForceReason::kContact;
+}
+
+void SafetyStage::MoveGain(const SafetyInput& input, bool fault) noexcept {
+  const double elapsed_s = std::max(Seconds(input.previous_duration_ns), 0.0);
+  if (fault) {
+    gain_ = 0;
+  } else if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
+    // A stall must not skip the soft start: it counts as one period.
+    const double soft_start_s = settings_.soft_start_ms * 1e-3;
+    gain_ =
+        soft_start_s > 0 ? std::min(1.0, gain_ + std::min(elapsed_s, period_s_) / soft_start_s) : 1;
+  } else if (input.peer == PeerState::kLost) {
+    gain_ = std::max(0.0, gain_ - elapsed_s / (settings_.fade_ms * 1e-3));
+  } else {
+    gain_ = 0;
+  }
+}
+
+Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
+  const ForceReason fault = Fault(input);
+  const bool faulted = fault != ForceReason::kContact;
+  MoveGain(input, faulted);
+
+  const bool wants = !faulted && !input.wanted.isZero(0);
+  Vec3 target = faulted || gain_ == 0 ? Vec3(Vec3::Zero()) : Vec3(gain_ * input.wanted);
+  const bool capped = Shorten(target, settings_.force_cap_n);
+  Vec3 change = target - displayed_;
+  const bool slewed = Shorten(change, largest_step_n_);
+  command_ = slewed ? Vec3(displayed_ + change) : target;
+  // If a device ever displays more than the cap, the cap goes before the slew limit.
+  Shorten(command_, settings_.force_cap_n);
+  if (!command_.allFinite()) command_.setZero();
+
+  if (faulted) {
+    reason_ = fault;
+  } else if (input.peer == PeerState::kLost) {
+    reason_ = ForceReason::kWorldLost;
+  } else if (input.peer != PeerState::kLive && input.peer != PeerState::kLate) {
+    reason_ = ForceReason::kWorldAbsent;
+  } else if (slewed) {
+    reason_ = ForceReason::kSlewLimited;
+  } else if (capped) {
+    reason_ = ForceReason::kCapped;
+  } else if (wants && gain_ < 1) {
+    reason_ = ForceReason::kSoftStart;
+  } else if (input.no_channel) {
+    reason_ = ForceReason::kNoChannel;
+  } else if (input.peer == PeerState::kLate) {
+    reason_ = ForceReason::kWorldLate;
+  } else {
+    reason_ = wants ? ForceReason::kContact : ForceReason::kNoContact;
+  }
+  return command_;
+}
+
+void SafetyStage::Displayed(const Vec3& force) noexcept {
+  displayed_ = force.allFinite() ? force : Vec3(Vec3::Zero());
+  const double missed = (displayed_ - command_).norm();
+  const bool may_be_named =
+      reason_ == ForceReason::kNoContact || reason_ == ForceReason::kContact ||
+      reason_ == ForceReason::kCapped || reason_ == ForceReason::kSlewLimited ||
+      reason_ == ForceReason::kSoftStart || reason_ == ForceReason::kWorldLate;
+  if (may_be_named && missed > std::max(kMissedFraction * command_.norm(), kMissedForce)) {
+    reason_ = ForceReason::kTensionLimited;
+  }
+}
+
+std::int64_t ZeroForceAfter(const Settings& settings, std::int64_t world_period_ns) noexcept {
+  const double slew_s = settings.safety.force_cap_n / settings.safety.slew_limit_n_per_s;
+  const double fade_s = settings.safety.fade_ms * 1e-3;
+  return LostAfter(settings, world_period_ns) +
+         static_cast<std::int64_t>(std::ceil((fade_s + slew_s) * 1e9)) + 3 * settings.period_ns();
+}
+
+}  // namespace rikiseki::haptic

@@ -1,0 +1,210 @@
+#include "haptic_server/settings.h"
+
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/device/tension.h"
+
+namespace rikiseki::haptic {
+namespace {
+
+constexpr double kLongestZeroingMs = 100;  // from "lost" to zero force
+
+// The keys of the daemon's own file.
+ConfigSchema DaemonSchema(Settings& settings) {
+  ConfigSchema schema;
+  LoopSettings& loop = settings.loop;
+  schema.Number("loop.rate_hz", &loop.rate_hz, 100, 8000, "How often the force is computed.");
+  schema.Integer("loop.fifo_priority", &loop.fifo_priority, 1, 98,
+                 "SCHED_FIFO priority of the loop's thread.");
+  schema.Integer("loop.cpu", &loop.cpu, -1, 1023,
+                 "The processor the loop is pinned to; -1 leaves it to the scheduler.");
+  schema.Choice("loop.realtime", &loop.realtime,
+                {{"enforce", RealtimePolicy::kEnforce}, {"ignore", RealtimePolicy::kIgnore}},
+                "Whether to refuse to start without real-time scheduling and locked memory.");
+  schema.Integer("loop.fault_after_misses", &loop.fault_after_misses, 1, 1000,
+                 "So many missed deadlines in a row bring the force to zero.");
+  schema.Number("loop.longest_world_period_ms", &loop.longest_world_period_ms, 5, 1000,
+                "The slowest world to expect: sizes the ring and bounds the time-outs.");
+
+  RenderSettings& render = settings.render;
+  schema.Number("render.stiffness_n_per_m", &render.stiffness_n_per_m, 0, 1e5,
+                "Stiffness of surfaces that bring none of their own.");
+  schema.Number("render.damping_ns_per_m", &render.damping_ns_per_m, 0, 1000,
+                "Damping of surfaces that bring no stiffness of their own.");
+  schema.Flag("render.adhesion", &render.adhesion,
+              "Whether the damper may pull the finger back when it leaves, as in the paper.");
+  schema.Choice("render.display", &render.display,
+                {{"interpolate", DisplayRule::kInterpolate},
+                 {"hold", DisplayRule::kHold},
+                 {"extrapolate", DisplayRule::kExtrapolate}},
+                "How surfaces move between two world frames.");
+  schema.Number("render.finger_radius_mm", &render.finger_radius_mm, 0, 100,
+                "Radius of the sphere that stands for the finger.");
+
+  SafetySettings& safety = settings.safety;
+  schema.Number("safety.force_cap_n", &safety.force_cap_n, 0.1, 100,
+                "No displayed force exceeds this.");
+  schema.Number("safety.slew_limit_n_per_s", &safety.slew_limit_n_per_s, 10, 1e6,
+                "The displayed force does not change faster.");
+  schema.Number("safety.speed_limit_m_per_s", &safety.speed_limit_m_per_s, 0.1, 100,
+                "A faster finger feels no force.");
+  schema.Number("safety.soft_start_ms", &safety.soft_start_ms, 0, 5000,
+                "How long the force takes to come back after a world came or a fault went.");
+  schema.Number("safety.fade_ms", &safety.fade_ms, 10, 100,
+                "How long the force takes to go when the world is lost.");
+  schema.Number("safety.late_periods", &safety.late_periods, 1.1, 100,
+                "No frame for so many world periods: the world is late, surfaces are held.");
+  schema.Number("safety.lost_periods", &safety.lost_periods, 1.2, 200,
+                "No frame for so many world periods: the world is lost.");
+  schema.Number("safety.lost_floor_ms", &safety.lost_floor_ms, 10, 2000,
+                "A silence shorter than this is never a loss.");
+
+  schema.Choice("device.kind", &settings.device.kind, {{"simulated", DeviceKind::kSimulated}},
+                "Which force display to drive.");
+  schema.Path("device.file", &settings.device.file,
+              "The file that describes the display, relative to this one.");
+
+  HandSettings& hand = settings.hand;
+  schema.Choice("hand.script", &hand.script,
+                {{"push", HandScript::kPush}, {"rest", HandScript::kRest}},
+                "What the simulated hand does.");
+  schema.Number("hand.mass_kg", &hand.mass_kg, 0.001, 100, "Mass of the hand alone.");
+  schema.Number("hand.damping_ns_per_m", &hand.damping_ns_per_m, 0, 1000,
+                "Damping of the hand alone.");
+  schema.Number("hand.stiffness_n_per_m", &hand.stiffness_n_per_m, 0, 1e5,
+                "Stiffness of the hand about its intended path.");
+  schema.Vector("hand.home_mm", &hand.home_mm, -1000, 1000, "Where a push starts and ends.");
+  schema.Vector("hand.stroke_mm", &hand.stroke_mm, -1000, 1000, "The reach of one push.");
+  schema.Number("hand.reach_ms", &hand.reach_ms, 1, 1e5, "Duration of the way there.");
+  schema.Number("hand.hold_ms", &hand.hold_ms, 0, 1e5, "Duration of the stay there.");
+  schema.Number("hand.return_ms", &hand.return_ms, 1, 1e5, "Duration of the way back.");
+  schema.Number("hand.rest_ms", &hand.rest_ms, 0, 1e5, "Rest between two pushes.");
+  schema.Number("hand.rest_jitter_ms", &hand.rest_jitter_ms, 0, 1e5,
+                "Random part of the rest, so that pushes meet every phase of the world.");
+  schema.Integer("hand.seed", &hand.seed, 0, 2'000'000'000, "Seed of the random part.");
+  return schema;
+}
+
+// The keys of a device file.
+ConfigSchema DeviceSchema(SpidarSettings& spidar) {
+  ConfigSchema schema;
+  schema.Vectors("spidar.motors_m", &spidar.motors_m, -10, 10,
+                 "Where the four strings leave their motors, device axes.");
+  schema.Number("spidar.count_length_m", &spidar.count_length_m, 1e-7, 1e-3,
+                "String length per encoder count.");
+  schema.Number("spidar.tension_min_n", &spidar.tension_min_n, 0, 10,
+                "Tension that keeps a string from going slack.");
+  schema.Number("spidar.tension_max_n", &spidar.tension_max_n, 0.1, 100,
+                "The most a motor may pull.");
+  schema.Number("spidar.velocity_cutoff_hz", &spidar.velocity_cutoff_hz, 1, 4000,
+                "Corner of the first-order velocity filter.");
+  schema.Number("spidar.moving_mass_kg", &spidar.moving_mass_kg, 0, 10,
+                "Mass that moves with the grip.");
+  schema.Number("spidar.friction_damping_ns_per_m", &spidar.friction_damping_ns_per_m, 0, 100,
+                "Viscous friction of motors and strings.");
+  return schema;
+}
+
+struct Conflict {
+  std::string key;
+  std::string why;
+};
+
+std::optional<Conflict> FindConflict(const Settings& settings) {
+  const SafetySettings& safety = settings.safety;
+  const double slew_ms = 1e3 * safety.force_cap_n / safety.slew_limit_n_per_s;
+  if (!(safety.fade_ms + slew_ms <= kLongestZeroingMs)) {
+    return Conflict{
+        "safety.fade_ms",
+        "with safety.force_cap_n / safety.slew_limit_n_per_s it takes longer than 100 ms "
+        "from a lost world to zero force"};
+  }
+  if (!(safety.late_periods < safety.lost_periods)) {
+    return Conflict{"safety.lost_periods", "it must exceed safety.late_periods"};
+  }
+  return std::nullopt;
+}
+
+std::optional<Conflict> FindConflict(const SpidarSettings& spidar) {
+  if (spidar.motors_m.size() != kTensionStrings) {
+    return Conflict{"spidar.motors_m", "exactly 4 motors are expected"};
+  }
+  try {
+    const SpidarKinematics kinematics(spidar.motors_m);
+  } catch (const std::invalid_argument& error) {
+    return Conflict{"spidar.motors_m", error.what()};
+  }
+  if (!(spidar.tension_min_n < spidar.tension_max_n)) {
+    return Conflict{"spidar.tension_max_n", "it must exceed spidar.tension_min_n"};
+  }
+  return std::nullopt;
+}
+
+void RequirePositive(const std::string& key, double value) {
+  if (!(value > 0) || !std::isfinite(value)) {
+    throw std::invalid_argument(key + " must be positive and finite");
+  }
+}
+
+void RequireNotNegative(const std::string& key, double value) {
+  if (!(value >= 0) || !std::isfinite(value)) {
+    throw std::invalid_argument(key + " must not be negative, and be finite");
+  }
+}
+
+}  // namespace
+
+std::int64_t Settings::period_ns() const {
+  return static_cast<std::int64_t>(std::llround(1e9 / loop.rate_hz));
+}
+
+Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
+                      std::string* description) {
+  const std::string device_prefix = "spidar.";
+  Settings settings;
+  ConfigSchema daemon = DaemonSchema(settings);
+  daemon.Load(path);
+  for (const std::string& assignment : set) {
+    if (!assignment.starts_with(device_prefix)) daemon.Set(assignment);
+  }
+  if (settings.device.file.empty()) daemon.Refuse("device.file", "the display needs a description");
+
+  ConfigSchema device = DeviceSchema(settings.spidar);
+  device.Load(settings.device.file);
+  for (const std::string& assignment : set) {
+    if (assignment.starts_with(device_prefix)) device.Set(assignment);
+  }
+
+  if (const auto conflict = FindConflict(settings)) daemon.Refuse(conflict->key, conflict->why);
+  if (const auto conflict = FindConflict(settings.spidar)) {
+    device.Refuse(conflict->key, conflict->why);
+  }
+  if (description != nullptr) *description = daemon.Describe() + device.Describe();
+  return settings;
+}
+
+void CheckSettings(const Settings& settings) {
+  RequirePositive("loop.rate_hz", settings.loop.rate_hz);
+  RequirePositive("loop.fault_after_misses", settings.loop.fault_after_misses);
+  RequirePositive("loop.longest_world_period_ms", settings.loop.longest_world_period_ms);
+  RequireNotNegative("render.stiffness_n_per_m", settings.render.stiffness_n_per_m);
+  RequireNotNegative("render.damping_ns_per_m", settings.render.damping_ns_per_m);
+  RequireNotNegative("render.finger_radius_mm", settings.render.finger_radius_mm);
+  RequirePositive("safety.force_cap_n", settings.safety.force_cap_n);
+  RequirePositive("safety.slew_limit_n_per_s", settings.safety.slew_limit_n_per_s);
+  RequirePositive("safety.speed_limit_m_per_s", settings.safety.speed_limit_m_per_s);
+  RequireNotNegative("safety.soft_start_ms", settings.safety.soft_start_ms);
+  RequirePositive("safety.fade_ms", settings.safety.fade_ms);
+  RequirePositive("safety.late_periods", settings.safety.late_periods);
+  RequirePositive("safety.lost_periods", settings.safety.lost_periods);
+  RequireNotNegative("safety.lost_floor_ms", settings.safety.lost_floor_ms);
+  if (settings.period_ns() <= 0) throw std::invalid_argument("loop.rate_hz is too high");
+  if (const auto conflict = FindConflict(settings)) {
+    throw std::invalid_argument(conflict->key + ": " + conflict->why);
+  }
+}
+
+}  // namespace rikiseki::haptic

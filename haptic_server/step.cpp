@@ -1,0 +1,289 @@
+#include "haptic_server/step.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "common/clock.h"
+#include "haptic_server/render/contact_solve.h"
+#include "haptic_server/render/feature_track.h"
+#include "haptic_server/render/ledger.h"
+#include "haptic_server/render/surface_force.h"
+#include "haptic_server/safety/peer_watch.h"
+#include "haptic_server/safety/safety_stage.h"
+
+namespace rikiseki::haptic {
+namespace {
+
+using protocol::ForceReason;
+using protocol::PeerState;
+
+constexpr std::uint32_t kPointer = 0;
+constexpr std::int64_t kShortestFrameNs = 1'000;
+constexpr std::uint64_t kLongestFrameNs = 10'000'000'000;
+
+// The acks of frames lie a few world periods back; a world that stalls for seconds resumes with new
+// ticks.
+std::uint64_t HistoryTicks(const Settings& settings) {
+  const double world_period_s = settings.loop.longest_world_period_ms * 1e-3;
+  return static_cast<std::uint64_t>(8 * world_period_s * settings.loop.rate_hz) + 4096;
+}
+
+bool IsSound(const DeviceSample& sample) {
+  return sample.position.allFinite() && sample.velocity.allFinite() &&
+         sample.position.cwiseAbs().maxCoeff() <= kLargestCoordinate;
+}
+
+// Denormal numbers mean nothing in metres and cost a slow path in the processor.
+void FlushDenormals(Vec3& v) {
+  for (double& x : v) {
+    if (std::abs(x) < std::numeric_limits<double>::min()) x = 0;
+  }
+}
+
+}  // namespace
+
+struct HapticStep::State {
+  State(const Settings& checked, Device& used_device, std::uint64_t own_epoch)
+      : settings(checked),
+        period_ns(checked.period_ns()),
+        radius(checked.render.finger_radius_mm * 1e-3),
+        device(used_device),
+        track(checked.render.display, period_ns),
+        surface_force(checked.render, Seconds(period_ns)),
+        ledger(period_ns, HistoryTicks(checked), own_epoch),
+        peer(checked),
+        safety(checked) {
+    health.period_ns = static_cast<std::uint64_t>(period_ns);
+    health.slew_limit = checked.safety.slew_limit_n_per_s;
+    const std::string name = device.Name();
+    std::copy_n(name.begin(), std::min(name.size(), health.device.size() - 1),
+                health.device.begin());
+  }
+
+  bool TakeFrame(const WorldInput& world) noexcept;
+  void WatchWorld(const TickTime& time, const WorldInput& world, double speed) noexcept;
+  std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
+  void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
+               protocol::HapticTick& message) noexcept;
+
+  const Settings settings;
+  const std::int64_t period_ns;
+  const double radius;  // m
+  Device& device;
+
+  FeatureTrack track;
+  SurfaceForce surface_force;
+  Ledger ledger;
+  PeerWatch peer;
+  SafetyStage safety;
+
+  std::uint64_t tick = 0;
+  std::int64_t start_ns = 0;
+  DeviceSample sample;             // the last sound one
+  double penetration = 0;          // m, |e| of the tick before
+  std::uint64_t newest_epoch = 0;  // of the newest sound frame, and its number
+  std::uint64_t newest_frame = 0;
+  std::uint64_t shown_epoch = 0;  // whose surfaces are in the track; 0 = none
+  std::uint64_t shown_frame = 0;
+  std::uint64_t channel_epoch = 0;  // whose bodies the channels are about
+  std::uint64_t missed_in_a_row = 0;
+  Vec3 displayed = Vec3::Zero();  // N
+  std::array<HalfSpace, kMaxContactPlanes> planes;
+  std::array<BodyShare, kMaxShares> shares;
+  protocol::HapticHealth health;
+};
+
+// Whether a new frame came that may be used, and books its ack if so. // RT:
+bool HapticStep::State::TakeFrame(const WorldInput& world) noexcept {
+  if (world.frame == nullptr || world.epoch == 0) return false;
+  const protocol::WorldFrame& frame = *world.frame;
+  const bool is_new = world.epoch != newest_epoch || frame.frame > newest_frame;
+  const bool is_sound = frame.plane_count <= protocol::kMaxPlanes &&
+                        frame.period_ns >= kShortestFrameNs && frame.period_ns <= kLongestFrameNs;
+  if (!is_new || !is_sound) return false;
+  newest_epoch = world.epoch;
+  newest_frame = frame.frame;
+  ledger.Receive(world.epoch, frame);
+  return true;
+}
+
+// Peer watch and feature track. // RT:
+void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world,
+                                   double speed) noexcept {
+  const std::int64_t elapsed_ticks = 1 + std::max<std::int64_t>(time.missed, 0);
+  const bool fresh = TakeFrame(world);
+  const PeerSign sign{
+      .epoch = world.epoch,
+      .ready = world.ready,
+      .heartbeat_ns = world.heartbeat_ns,
+      .fresh_frame = fresh,
+      .frame_period_ns = fresh ? static_cast<std::int64_t>(world.frame->period_ns) : 0};
+  const PeerState state = peer.Update(time.start_ns, sign, safety.is_zero());
+
+  if (tick > 0) track.Advance(elapsed_ticks);
+  if (state == PeerState::kAbsent && shown_epoch != 0) {
+    track.Clear();
+    surface_force.Reset();
+    penetration = 0;
+    shown_epoch = shown_frame = 0;
+  }
+  if (fresh && peer.Accepts(world.epoch)) {
+    if (channel_epoch != world.epoch) {
+      ledger.FreeChannels();
+      channel_epoch = world.epoch;
+    }
+    // A surface as deep as the present contact, or as the finger gets in a tick or two, is no
+    // surprise.
+    const double approach = speed * Seconds(period_ns) * static_cast<double>(1 + elapsed_ticks);
+    const FingerState finger{sample.position, radius, penetration + approach + 1e-6};
+    track.Receive(*world.frame, std::span(&finger, 1));
+    shown_epoch = world.epoch;
+    shown_frame = world.frame->frame;
+  }
+}
+
+// Contact solve and surface force at the last sound sample. Bodies without a channel are left out.
+// // RT:
+std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
+                                                     bool& no_channel) noexcept {
+  const std::span<const Surface> surfaces = track.Surfaces();
+  for (std::size_t i = 0; i < surfaces.size(); ++i) planes[i] = surfaces[i].plane;
+  const ContactSolution contact =
+      SolveContact(sample.position, radius, std::span(planes).first(surfaces.size()));
+  penetration = contact.displacement.norm();
+  std::size_t count = 0;
+  for (const BodyShare& share : surface_force.Update(surfaces, contact, radius, elapsed_ticks)) {
+    if (ledger.Open(share.body, share.generation, kPointer, tick)) {
+      shares[count++] = share;
+    } else {
+      no_channel = true;
+    }
+  }
+  return std::span(shares).first(count);
+}
+
+// RT:
+void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceReason reason,
+                                protocol::HapticTick& message) noexcept {
+  message.tick = tick;
+  message.start_ns = static_cast<std::uint64_t>(time.start_ns);
+  message.period_ns = static_cast<std::uint64_t>(period_ns);
+  message.previous_duration_ns =
+      static_cast<std::uint64_t>(std::max<std::int64_t>(time.previous_duration_ns, 0));
+  message.world_epoch = shown_epoch;
+  message.world_frame = shown_frame;
+  message.stiffness = settings.render.stiffness_n_per_m;
+  message.damping = settings.render.damping_ns_per_m;
+  message.force_cap = settings.safety.force_cap_n;
+  message.pointer_count = 1;
+  protocol::Pointer& pointer = message.pointers[0];
+  pointer = {};
+  pointer.pointer = kPointer;
+  pointer.reason = reason;
+  pointer.radius = radius;
+  pointer.position = ToArray(sample.position);
+  pointer.velocity = ToArray(sample.velocity);
+  pointer.force = ToArray(force);
+  ledger.Write(message);
+
+  health.ticks = tick + 1;
+  missed_in_a_row = time.missed > 0 ? missed_in_a_row + static_cast<std::uint64_t>(time.missed) : 0;
+  health.missed += static_cast<std::uint64_t>(std::max<std::int64_t>(time.missed, 0));
+  health.worst_missed_in_a_row = std::max(health.worst_missed_in_a_row, missed_in_a_row);
+  health.reason_ticks = reason == health.reason ? health.reason_ticks + 1 : 0;
+  health.reason = reason;
+  health.peer_state = peer.state();
+  health.peer_epoch = peer.epoch();
+  const bool has_frame = shown_epoch != 0;
+  health.feature_age_ns =
+      has_frame
+          ? static_cast<std::uint64_t>(std::max<std::int64_t>(peer.frame_age_ns(time.start_ns), 0))
+          : 0;
+  health.zero_force_after_ns =
+      static_cast<std::uint64_t>(ZeroForceAfter(settings, peer.world_period_ns()));
+  health.largest_force = std::max(health.largest_force, force.norm());
+  health.largest_force_step = std::max(health.largest_force_step, (force - displayed).norm());
+  health.target = ToArray(sample.target);
+  health.books = ledger.books();
+
+  displayed = force;
+  start_ns = time.start_ns;
+  ++tick;
+}
+
+HapticStep::HapticStep(const Settings& settings, Device& device, std::uint64_t own_epoch) {
+  CheckSettings(settings);
+  state_ = std::make_unique<State>(settings, device, own_epoch);
+}
+
+HapticStep::~HapticStep() = default;
+
+void HapticStep::Tick(const TickTime& time, const WorldInput& world,
+                      protocol::HapticTick& message) noexcept {
+  State& state = *state_;
+  SafetyInput input;
+  DeviceSample sample;
+  input.device_ok = state.device.Read(time.start_ns, sample) == DeviceStatus::kOk;
+  input.sample_finite = input.device_ok && IsSound(sample);
+  if (input.sample_finite) {
+    FlushDenormals(sample.position);
+    FlushDenormals(sample.velocity);
+    if (!sample.target.allFinite()) sample.target = sample.position;
+    state.sample = sample;
+    input.speed = sample.velocity.stableNorm();
+  }
+
+  state.WatchWorld(time, world, input.speed);
+
+  const PeerState peer = state.peer.state();
+  std::span<const BodyShare> shares;
+  if (input.sample_finite &&
+      (peer == PeerState::kLive || peer == PeerState::kLate || peer == PeerState::kLost)) {
+    shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
+    for (const BodyShare& share : shares) input.wanted += share.force;
+  } else {
+    state.surface_force.Reset();
+    state.penetration = 0;
+  }
+
+  input.peer = peer;
+  input.previous_duration_ns = time.previous_duration_ns;
+  input.missed = time.missed;
+  Vec3 displayed = state.device.Write(state.safety.Limit(input));
+  if (!displayed.allFinite()) displayed.setZero();
+  state.safety.Displayed(displayed);
+
+  state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
+                     .pointer = kPointer,
+                     .displayed = displayed,
+                     .wanted = shares,
+                     .finger = state.sample.position});
+  state.ledger.CloseIdle(kPointer, state.tick, [&](std::uint32_t body, std::uint32_t generation) {
+    return state.track.Has(body, generation, kPointer);
+  });
+  state.Publish(time, displayed, state.safety.reason(), message);
+}
+
+void HapticStep::Stop(protocol::HapticTick& message) noexcept {
+  State& state = *state_;
+  state.device.Release();
+  const TickTime time{.start_ns = state.start_ns + state.period_ns,
+                      .previous_duration_ns = state.period_ns,
+                      .missed = 0};
+  state.safety.Displayed(Vec3::Zero());
+  state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
+                     .pointer = kPointer,
+                     .displayed = Vec3::Zero(),
+                     .wanted = {},
+                     .finger = state.sample.position});
+  state.Publish(time, Vec3::Zero(), ForceReason::kStopped, message);
+}
+
+const protocol::HapticHealth& HapticStep::health() const noexcept {
+  return state_->health;
+}
+
+}  // namespace rikiseki::haptic

@@ -1,0 +1,88 @@
+#include "protocol/ring.h"
+
+namespace rikiseki::protocol {
+namespace {
+
+// A lock-free 8-byte load writes nothing, so it may look at a read-only page through an atomic_ref,
+// which C++20 does not offer for const words; hence Ring holds plain pointers on both sides.
+std::uint64_t Load(std::uint64_t& word, std::memory_order order) noexcept {
+  return std::atomic_ref<std::uint64_t>(word).load(order);
+}
+
+constexpr int kTries = 3;
+// Twice a number must fit into a word: 292 million years at 1 kHz.
+constexpr std::uint64_t kEndOfNumbers = 1ULL << 63;
+// ReadNext keeps this far from the slot that the writer fills next.
+constexpr std::uint64_t kGuard = 2;
+
+}  // namespace
+
+bool StreamWriter::Publish(std::span<const std::uint64_t> payload, std::uint32_t blocks,
+                           std::uint64_t stamp_ns) noexcept {
+  if (payload.size_bytes() > ring_.payload_bytes) return false;
+  ++published_;
+  PublishStores(ring_, published_, payload, blocks, stamp_ns,
+                [](std::uint64_t& word, std::uint64_t value, std::memory_order order) {
+                  std::atomic_ref<std::uint64_t>(word).store(value, order);
+                });
+  return true;
+}
+
+bool StreamReader::Copy(std::uint64_t number, std::span<std::uint64_t> payload,
+                        Received& received) noexcept {
+  std::uint64_t* slot = ring_.Slot(number);
+  // SYNC: whole. Everything that the writer stored before 2n is visible from here on.
+  if (Load(slot[kSequenceWord], std::memory_order_acquire) != 2 * number) return false;
+  // SYNC: slot words. A word of a later message m makes its mark 2m - 1 visible to the last look.
+  const std::uint64_t stamp_ns = Load(slot[kStampWord], std::memory_order_acquire);
+  const std::uint64_t shape = Load(slot[kShapeWord], std::memory_order_acquire);
+  const auto used_bytes = static_cast<std::uint32_t>(shape);
+  const std::size_t words =
+      std::min<std::size_t>(std::min(used_bytes, ring_.payload_bytes) / 8, payload.size());
+  for (std::size_t i = 0; i < words; ++i) {
+    payload[i] = Load(slot[kPayloadWord + i], std::memory_order_acquire);
+  }
+  if (Load(slot[kSequenceWord], std::memory_order_relaxed) != 2 * number) return false;
+  received = {number, stamp_ns, used_bytes, static_cast<std::uint32_t>(shape >> 32)};
+  return true;
+}
+
+ReadStatus StreamReader::Return(const Received& received) noexcept {
+  cursor_ = received.number;
+  const bool plausible = received.used_bytes <= ring_.payload_bytes && received.used_bytes % 8 == 0;
+  return plausible ? ReadStatus::kFresh : ReadStatus::kRejected;
+}
+
+ReadStatus StreamReader::ReadLatest(std::span<std::uint64_t> payload, Received& received) noexcept {
+  if (ring_.published == nullptr) return ReadStatus::kEmpty;
+  for (int i = 0; i < kTries; ++i) {
+    // SYNC: published. The message with this number is whole.
+    const std::uint64_t newest = Load(*ring_.published, std::memory_order_acquire);
+    if (newest < cursor_ || newest >= kEndOfNumbers) return ReadStatus::kBackwards;
+    if (newest == 0) return ReadStatus::kEmpty;
+    if (newest == cursor_) return ReadStatus::kSame;
+    if (Copy(newest, payload, received)) return Return(received);
+    ++retries_;
+  }
+  return ReadStatus::kContended;
+}
+
+ReadStatus StreamReader::ReadNext(std::span<std::uint64_t> payload, Received& received) noexcept {
+  if (ring_.published == nullptr) return ReadStatus::kEmpty;
+  for (int i = 0; i < kTries; ++i) {
+    // SYNC: published. Every message up to this number was whole when it was published.
+    const std::uint64_t newest = Load(*ring_.published, std::memory_order_acquire);
+    if (newest < cursor_ || newest >= kEndOfNumbers) return ReadStatus::kBackwards;
+    if (newest == cursor_) return ReadStatus::kEmpty;
+    if (newest - cursor_ > ring_.slot_count - kGuard) {
+      const std::uint64_t resumed = newest - ring_.slot_count / 2;
+      lost_ += resumed - cursor_;
+      cursor_ = resumed;
+    }
+    if (Copy(cursor_ + 1, payload, received)) return Return(received);
+    ++retries_;
+  }
+  return ReadStatus::kContended;
+}
+
+}  // namespace rikiseki::protocol

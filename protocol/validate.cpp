@@ -1,0 +1,150 @@
+#include "protocol/validate.h"
+
+#include <cmath>
+
+namespace rikiseki::protocol {
+namespace {
+
+bool Finite(double value) {
+  return std::isfinite(value);
+}
+bool Finite(const Vector& v) {
+  return std::isfinite(v[0]) && std::isfinite(v[1]) && std::isfinite(v[2]);
+}
+template <typename... Values>
+bool AllFinite(const Values&... values) {
+  return (Finite(values) && ...);
+}
+
+constexpr std::uint64_t kLongestPeriodNs = 10'000'000'000;  // SPEC.md 6: no loop is slower
+
+bool IsPeriod(std::uint64_t period_ns) {
+  return period_ns >= 1 && period_ns <= kLongestPeriodNs;
+}
+bool IsReason(ForceReason reason) {
+  return reason <= ForceReason::kStopped;
+}
+bool IsPeerState(PeerState state) {
+  return state <= PeerState::kIncompatible;
+}
+bool IsCoupling(Coupling c) {
+  return c >= Coupling::kPosition && c <= Coupling::kLocal;
+}
+
+// A direction that is of unit length as far as doubles can tell keeps its bits; another is
+// renormalised.
+constexpr double kUnitTolerance = 1e-14;
+
+DecodeStatus Normalise(Quaternion& q) {
+  const double norm = std::hypot(std::hypot(q[0], q[1]), std::hypot(q[2], q[3]));
+  if (!std::isfinite(norm)) return DecodeStatus::kNotFinite;
+  if (norm < 0.99 || norm > 1.01) return DecodeStatus::kQuaternion;
+  if (std::abs(norm - 1) > kUnitTolerance) {
+    for (double& component : q) component /= norm;
+  }
+  return DecodeStatus::kOk;
+}
+
+DecodeStatus Normalise(Vector& normal) {
+  const double norm = std::hypot(normal[0], normal[1], normal[2]);
+  if (!std::isfinite(norm)) return DecodeStatus::kNotFinite;
+  if (!(norm > 1e-12)) return DecodeStatus::kNormal;
+  if (std::abs(norm - 1) > kUnitTolerance) {
+    for (double& component : normal) component /= norm;
+  }
+  return DecodeStatus::kOk;
+}
+
+}  // namespace
+
+const char* Describe(DecodeStatus status) noexcept {
+  switch (status) {
+    case DecodeStatus::kOk:
+      return "the message is sound";
+    case DecodeStatus::kLength:
+      return "its length does not agree with its counts";
+    case DecodeStatus::kCount:
+      return "it counts more entries than there may be";
+    case DecodeStatus::kEnumerator:
+      return "an enumerator names nothing";
+    case DecodeStatus::kIdentity:
+      return "a pointer does not exist or stands twice";
+    case DecodeStatus::kNotFinite:
+      return "a value is not finite";
+    case DecodeStatus::kRange:
+      return "a value is outside its range";
+    case DecodeStatus::kQuaternion:
+      return "an orientation is not a unit quaternion";
+    case DecodeStatus::kNormal:
+      return "a normal has no direction";
+  }
+  return "unknown";
+}
+
+DecodeStatus Validate(HapticTick& m) noexcept {
+  if (!AllFinite(m.stiffness, m.damping, m.force_cap)) return DecodeStatus::kNotFinite;
+  if (m.stiffness < 0 || m.damping < 0 || m.force_cap < 0 || !IsPeriod(m.period_ns)) {
+    return DecodeStatus::kRange;
+  }
+  std::uint32_t seen = 0;
+  for (std::uint32_t i = 0; i < m.pointer_count; ++i) {
+    Pointer& p = m.pointers[i];
+    if (p.pointer >= kMaxPointers || (seen & 1u << p.pointer) != 0) return DecodeStatus::kIdentity;
+    seen |= 1u << p.pointer;
+    if (!IsReason(p.reason)) return DecodeStatus::kEnumerator;
+    if (!AllFinite(p.radius, p.position, p.velocity, p.angular_velocity, p.force, p.torque)) {
+      return DecodeStatus::kNotFinite;
+    }
+    if (p.radius < 0) return DecodeStatus::kRange;
+    if (const auto status = Normalise(p.orientation); status != DecodeStatus::kOk) return status;
+  }
+  for (std::uint32_t i = 0; i < m.channel_count; ++i) {
+    const Channel& c = m.channels[i];
+    if (c.pointer >= kMaxPointers) return DecodeStatus::kIdentity;
+    if (c.state != ChannelState::kOpen && c.state != ChannelState::kClosed) {
+      return DecodeStatus::kEnumerator;
+    }
+    if (c.opened_tick > m.tick) return DecodeStatus::kRange;
+    if (!AllFinite(c.first_moment, c.angular_first_moment, c.contact_point)) {
+      return DecodeStatus::kNotFinite;
+    }
+  }
+  return DecodeStatus::kOk;
+}
+
+DecodeStatus Validate(WorldFrame& m) noexcept {
+  if (!IsCoupling(m.coupling)) return DecodeStatus::kEnumerator;
+  if (m.frame == 0 || !IsPeriod(m.period_ns)) return DecodeStatus::kRange;
+  if (m.acked_epoch != 0 && m.baseline_tick > m.acked_tick) return DecodeStatus::kRange;
+  for (std::uint32_t i = 0; i < m.plane_count; ++i) {
+    Plane& p = m.planes[i];
+    if (p.pointer >= kMaxPointers) return DecodeStatus::kIdentity;
+    if (!AllFinite(p.point, p.stiffness, p.damping)) return DecodeStatus::kNotFinite;
+    if (p.stiffness < 0 || p.damping < 0) return DecodeStatus::kRange;
+    if (const auto status = Normalise(p.normal); status != DecodeStatus::kOk) return status;
+  }
+  return DecodeStatus::kOk;
+}
+
+DecodeStatus Validate(HapticHealth& m) noexcept {
+  if (!IsReason(m.reason) || !IsPeerState(m.peer_state)) return DecodeStatus::kEnumerator;
+  if (!AllFinite(m.largest_force, m.largest_force_step, m.slew_limit, m.target)) {
+    return DecodeStatus::kNotFinite;
+  }
+  return IsPeriod(m.period_ns) ? DecodeStatus::kOk : DecodeStatus::kRange;
+}
+
+DecodeStatus Validate(WorldHealth& m) noexcept {
+  if (!IsCoupling(m.coupling) || !IsPeerState(m.peer_state)) return DecodeStatus::kEnumerator;
+  if (!Finite(m.penalty_impulse)) return DecodeStatus::kNotFinite;
+  return IsPeriod(m.period_ns) ? DecodeStatus::kOk : DecodeStatus::kRange;
+}
+
+DecodeStatus Validate(Body& b) noexcept {
+  if (!AllFinite(b.mass, b.position, b.velocity, b.angular_velocity))
+    return DecodeStatus::kNotFinite;
+  if (b.mass < 0) return DecodeStatus::kRange;
+  return Normalise(b.orientation);
+}
+
+}  // namespace rikiseki::protocol

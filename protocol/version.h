@@ -1,0 +1,16 @@
+// The version of the protocol and the fingerprint of its layout. Whoever edits the layout finds the
+// build broken (layout.cpp) until this file is touched: decide then which number grows, by SPEC.md
+// section 8.
+#pragma once
+
+#include <cstdint>
+
+namespace rikiseki::protocol {
+
+inline constexpr std::uint16_t kVersionMajor = 0;
+inline constexpr std::uint16_t kVersionMinor = 1;
+
+/// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
+inline constexpr std::uint64_t kLayoutHash = 0x7F44583709F045DAULL;
+
+}  // namespace rikiseki::protocol

@@ -1,0 +1,51 @@
+# What the scripts share: Debian packages, building. Sourced, not run.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+jobs=$(nproc)
+export CCACHE_DIR=${CCACHE_DIR:-$HOME/.ccache}
+export CMAKE_CXX_COMPILER_LAUNCHER=ccache CMAKE_C_COMPILER_LAUNCHER=ccache
+
+packages_build=(build-essential cmake ninja-build ccache pkg-config git
+  libboost-dev libboost-program-options-dev libeigen3-dev libspdlog-dev nlohmann-json3-dev
+  libbullet-dev libsdformat-dev python3)
+packages_test=(catch2)
+packages_full=(clang libclang-rt-14-dev clang-format clang-tidy)
+
+say() { printf '%s\n' "$*" >&2; }
+die() { say "$0: $*"; exit 1; }
+
+# ensure_packages NAME...: installs what is missing, as root or through sudo.
+ensure_packages() {
+  local missing=() package
+  for package in "$@"; do
+    [ "$(dpkg-query -W -f='${db:Status-Status}' "$package" 2>/dev/null)" = installed ] ||
+      missing+=("$package")
+  done
+  [ ${#missing[@]} -eq 0 ] && return
+  local sudo=()
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || die "as root, install: ${missing[*]}"
+    sudo=(sudo)
+  fi
+  say "installing ${missing[*]}"
+  local log
+  log=$(mktemp)
+  { "${sudo[@]}" apt-get update -qq &&
+    "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq \
+      --no-install-recommends "${missing[@]}"; } >"$log" 2>&1 ||
+    { tail -20 "$log" >&2; rm -f "$log"; die "installing ${missing[*]} failed"; }
+  rm -f "$log"
+}
+
+# build PRESET [TARGET...]: configures and builds into build/PRESET; quiet unless it fails.
+build() {
+  local preset=$1 log
+  shift
+  log=$(mktemp)
+  say "building ($preset${*:+: $*})"
+  (cd "$root" && cmake --preset "$preset" && cmake --build --preset "$preset" -j "$jobs" \
+    ${*:+--target "$@"}) >"$log" 2>&1 ||
+    { grep -E 'error|Error|FAILED' "$log" | head -20 >&2; tail -30 "$log" >&2; rm -f "$log"
+      die "building $preset failed"; }
+  rm -f "$log"
+}

@@ -1,0 +1,145 @@
+// haptic_lab: experiments in virtual time with the very step functions that the daemons ship.
+#include <algorithm>
+#include <boost/program_options.hpp>
+#include <charconv>
+#include <fstream>
+#include <iostream>
+#include <thread>
+
+#include "common/daemon.h"
+#include "common/exit_code.h"
+#include "common/version.h"
+#include "tests/lab/fig6.h"
+#include "tests/lab/study.h"
+
+namespace rikiseki::lab {
+namespace {
+namespace po = boost::program_options;
+
+std::vector<Case> Cases() {
+  return {Fig6()};
+}
+
+struct Options {
+  std::string case_name;
+  std::string cases;  // the table to read; empty = the built-in grid
+  std::string out;
+  bool quick = false;
+  StudyOptions study;
+};
+
+std::string CaseNames() {
+  std::string names;
+  for (const Case& known : Cases()) names += (names.empty() ? "" : ", ") + known.name;
+  return names;
+}
+
+void PrintHelp(const po::options_description& description) {
+  std::cout << "haptic_lab CASE [options]\n"
+            << "Runs both loops in virtual time, row by row of a table.\n\nCases:\n";
+  for (const Case& known : Cases())
+    std::cout << "  " << known.name << "  " << known.purpose << "\n";
+  std::cout << "\n"
+            << description
+            << "\nExit status: 0; 1 if an expected result was missed; 64 for a wrong "
+            << "command line; 78 for a\nwrong table.\n";
+}
+
+// "K/N" with 1 <= K <= N.
+void ParseShard(const std::string& text, StudyOptions& options) {
+  const char* end = text.data() + text.size();
+  const auto shard = std::from_chars(text.data(), end, options.shard);
+  const bool slash = shard.ec == std::errc() && shard.ptr != end && *shard.ptr == '/';
+  const auto shards = slash ? std::from_chars(shard.ptr + 1, end, options.shards) : shard;
+  if (!slash || shards.ec != std::errc() || shards.ptr != end || options.shard < 1 ||
+      options.shard > options.shards) {
+    throw StartError(kExitUsage, "--shard " + text + ": K/N with 1 <= K <= N is expected");
+  }
+}
+
+Options Parse(int argc, char** argv) {
+  Options options;
+  options.study.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::string shard = "1/1";
+  po::options_description visible("Options");
+  visible.add_options()("cases", po::value(&options.cases)->value_name("F.csv"),
+                        "rows to run; without it, the case's own grid")(
+      "out", po::value(&options.out)->value_name("F.csv"),
+      "where the rows go, with got_... columns appended; without it, rows of --cases go to stdout")(
+      "quick", po::bool_switch(&options.quick), "makes the case's own grid smaller")(
+      "jobs", po::value(&options.study.jobs)->value_name("N"), "threads (default: one per core)")(
+      "shard", po::value(&shard)->value_name("K/N"), "only every N-th row, from the K-th on")(
+      "seed", po::value(&options.study.seed)->value_name("S"), "of what a case draws at random")(
+      "version", "prints the version")("help", "prints this");
+  po::options_description all;
+  all.add(visible).add_options()("case", po::value(&options.case_name));
+  po::positional_options_description positional;
+  positional.add("case", 1);
+  po::variables_map values;
+  try {
+    po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(),
+              values);
+    po::notify(values);
+  } catch (const po::error& error) {
+    throw StartError(kExitUsage, std::string(error.what()) + "; try --help");
+  }
+  if (values.count("help") != 0) {
+    PrintHelp(visible);
+    std::exit(kExitOk);
+  }
+  if (values.count("version") != 0) {
+    std::cout << "haptic_lab " << kVersion << " (" << kBuild << ")\n";
+    std::exit(kExitOk);
+  }
+  if (options.study.jobs < 1 || options.study.jobs > 1024) {
+    throw StartError(kExitUsage, "--jobs: 1 to 1024 is expected");
+  }
+  ParseShard(shard, options.study);
+  return options;
+}
+
+int Run(int argc, char** argv) {
+  const Options options = Parse(argc, argv);
+  const std::vector<Case> cases = Cases();
+  const auto study = std::find_if(cases.begin(), cases.end(), [&](const Case& known) {
+    return known.name == options.case_name;
+  });
+  if (study == cases.end()) {
+    const std::string complaint =
+        options.case_name.empty() ? "a case is required" : "there is no case " + options.case_name;
+    throw StartError(kExitUsage, complaint + "; those that exist: " + CaseNames());
+  }
+  const Table table =
+      options.cases.empty() ? study->grid(options.quick) : Table::Load(options.cases);
+  // Tried before the work, which may be long; what the file holds is kept until there is something
+  // new.
+  if (!options.out.empty() && !std::ofstream(options.out, std::ios::app)) {
+    throw StartError(kExitFault, options.out + ": cannot be written");
+  }
+
+  const StudyResult result = RunStudy(*study, table, options.study);
+  const bool rows_to_stdout = options.out.empty() && !options.cases.empty();
+  if (rows_to_stdout) WriteStudy(*study, result, std::cout);
+  if (!options.out.empty()) {
+    std::ofstream file(options.out, std::ios::binary);
+    WriteStudy(*study, result, file);
+    file.close();
+    if (!file) throw StartError(kExitFault, options.out + ": writing failed");
+  }
+  std::ostream& report = rows_to_stdout ? std::cerr : std::cout;
+  study->summarise(result.rows, result.outcomes, report);
+  report << result.rows.size() << " rows:";
+  for (const RowStatus status :
+       {RowStatus::kOk, RowStatus::kMissed, RowStatus::kUnstable, RowStatus::kUnsupported}) {
+    report << " " << result.Count(status) << " " << StatusName(status);
+  }
+  report << "\n";
+  return result.Count(RowStatus::kMissed) == 0 ? kExitOk : kExitFault;
+}
+
+}  // namespace
+}  // namespace rikiseki::lab
+
+int main(int argc, char** argv) {
+  return rikiseki::RunProgram("haptic_lab", [=] { return rikiseki::lab::Run(argc, argv); });
+}

@@ -1,0 +1,148 @@
+#include "tests/process/observer.h"
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cmath>
+
+#include "protocol/stream.h"
+
+namespace rikiseki::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// What the channels of `now` grew by since `before`: one that was not there counts from zero.
+protocol::ImpulseUnits Growth(const protocol::HapticTick& now, const protocol::HapticTick& before) {
+  protocol::ImpulseUnits growth{};
+  for (std::uint32_t i = 0; i < now.channel_count; ++i) {
+    const protocol::Channel& channel = now.channels[i];
+    protocol::ImpulseUnits earlier{};
+    for (std::uint32_t j = 0; j < before.channel_count; ++j) {
+      const protocol::Channel& other = before.channels[j];
+      if (other.body == channel.body && other.generation == channel.generation &&
+          other.pointer == channel.pointer && other.opened_tick == channel.opened_tick) {
+        earlier = other.impulse;
+      }
+    }
+    for (std::size_t axis = 0; axis < 3; ++axis) growth[axis] += channel.impulse[axis] - earlier[axis];
+  }
+  return growth;
+}
+
+template <typename Message>
+Message ReadNewest(const protocol::PeerView& view) {
+  auto reader = view.Reader<Message>();
+  Message message;
+  REQUIRE(Eventually([&] { return reader.ReadLatest(message) == protocol::ReadStatus::kFresh; }));
+  return message;
+}
+
+}  // namespace
+
+bool Eventually(const std::function<bool()>& condition, double seconds) {
+  const auto limit = Clock::now() + std::chrono::duration<double>(seconds);
+  while (!condition()) {
+    if (Clock::now() > limit) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+std::unique_ptr<protocol::PeerView> Observe(const std::string& instance, protocol::Role role,
+                                            double seconds) {
+  protocol::AttachResult result;
+  const bool attached = Eventually(
+      [&] {
+        result = protocol::Attach({.instance = instance, .role = role, .required = {}, .owners = {}});
+        return result.status == protocol::AttachStatus::kAttached;
+      },
+      seconds);
+  INFO(result.text);
+  REQUIRE(attached);
+  return std::move(result.view);
+}
+
+TickWatch::TickWatch(const std::string& instance, double slew_limit_n_per_s)
+    : view_(Observe(instance, protocol::Role::kHaptic)), slew_limit_(slew_limit_n_per_s) {
+  thread_ = std::thread([this] { Run(); });
+}
+
+TickWatch::~TickWatch() {
+  stop_ = true;
+  thread_.join();
+}
+
+void TickWatch::Run() {
+  auto reader = view_->Reader<protocol::HapticTick>();
+  protocol::HapticTick tick;
+  protocol::HapticTick tick_before;
+  protocol::Vector before{};
+  protocol::ImpulseUnits displayed{};
+  std::uint64_t number_before = 0;
+  while (!stop_) {
+    const protocol::ReadStatus status = reader.ReadNext(tick);
+    if (status != protocol::ReadStatus::kFresh) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      continue;
+    }
+    lost_ = reader.ring().lost();
+    const protocol::Vector& force = tick.pointers[0].force;
+    const double magnitude = std::hypot(force[0], force[1], force[2]);
+    if (!std::isfinite(magnitude)) finite_ = false;
+    worst_over_cap_ = std::max(worst_over_cap_.load(), magnitude - tick.force_cap);
+    if (number_before != 0 && reader.received().number == number_before + 1) {
+      const double step =
+          std::hypot(force[0] - before[0], force[1] - before[1], force[2] - before[2]);
+      const double allowed = slew_limit_ * static_cast<double>(tick.period_ns) * 1e-9;
+      worst_over_slew_ = std::max(worst_over_slew_.load(), step - allowed);
+    }
+    number_before = reader.received().number;
+    before = force;
+    const protocol::ImpulseUnits growth = Growth(tick, tick_before);
+    for (std::size_t axis = 0; axis < 3; ++axis) displayed[axis] += growth[axis];
+    tick_before = tick;
+    const std::lock_guard lock(mutex_);
+    ticks_.push_back({.tick = tick.tick,
+                      .start_ns = tick.start_ns,
+                      .world_frame = tick.world_frame,
+                      .force = magnitude,
+                      .force_x = force[0],
+                      .finger_x = tick.pointers[0].position[0],
+                      .reason = tick.pointers[0].reason,
+                      .displayed = displayed});
+  }
+}
+
+WatchedTick TickWatch::Latest() const {
+  const std::lock_guard lock(mutex_);
+  return ticks_.empty() ? WatchedTick{} : ticks_.back();
+}
+
+std::vector<WatchedTick> TickWatch::All() const {
+  const std::lock_guard lock(mutex_);
+  return ticks_;
+}
+
+protocol::HapticHealth ReadHapticHealth(const protocol::PeerView& view) {
+  return ReadNewest<protocol::HapticHealth>(view);
+}
+
+protocol::WorldHealth ReadWorldHealth(const protocol::PeerView& view) {
+  return ReadNewest<protocol::WorldHealth>(view);
+}
+
+protocol::WorldFrame ReadWorldFrame(const protocol::PeerView& view) {
+  return ReadNewest<protocol::WorldFrame>(view);
+}
+
+protocol::Body ReadMovingBody(const protocol::PeerView& view) {
+  protocol::BodiesReader reader(view.Stream(protocol::StreamType::kWorldBodies));
+  REQUIRE(Eventually([&] { return reader.ReadLatest() == protocol::ReadStatus::kFresh; }));
+  for (const protocol::Body& body : reader.bodies()) {
+    if (body.mass > 0) return body;
+  }
+  FAIL("no body can move");
+  return {};
+}
+
+}  // namespace rikiseki::test
