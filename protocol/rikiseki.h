@@ -9,7 +9,7 @@
  *   own side   rk_create, rk_writer_of;  each tick: rk_encode_*, rk_publish, rk_heartbeat; rk_close
  *   other side rk_attach (every 100 ms while detached, not in a thread with deadlines),
  *              rk_reader_of;  each tick: rk_state, rk_read_latest or rk_read_next, rk_decode_*;
- *              every 100 ms: rk_owner_alive, rk_is_current;  rk_detach
+ *              every 100 ms: rk_owner_alive, rk_replaced;  rk_detach
  *
  * Nothing here allocates memory. rk_publish, rk_read_*, rk_encode_*, rk_decode_*, rk_state and
  * rk_heartbeat make no system call and do not block. One thread per rk_writer and per rk_reader.
@@ -667,6 +667,8 @@ typedef struct rk_reader {
   uint64_t cursor;  /* number returned last */
   uint64_t lost;    /* overwritten before rk_read_next saw them */
   uint64_t retries; /* copies thrown away */
+  uint64_t rejected, rejected_in_a_row; /* by rk_accept */
+  uint64_t stamp_ns;                    /* of the message accepted last */
 } rk_reader;
 
 enum rk_read_status {
@@ -675,7 +677,7 @@ enum rk_read_status {
   RK_EMPTY,     /* nothing (more) was published */
   RK_CONTENDED, /* three tries failed: keep the previous value and count it */
   RK_BACKWARDS, /* the counter went back: the writer breaks the protocol, detach */
-  RK_REJECTED   /* impossible length: keep the previous value and count it */
+  RK_REJECTED   /* impossible length, counted: keep the previous value */
 };
 
 /* Publishes message published + 1. 0, and nothing happens, if it does not fit. 4.2 */
@@ -720,9 +722,32 @@ static inline int rk_copy(const rk_reader *r, uint64_t n, uint64_t *words, size_
 
 static inline enum rk_read_status rk_return(rk_reader *r, const rk_received *received) {
   r->cursor = received->number;
-  return received->used_bytes <= r->payload_bytes && received->used_bytes % 8 == 0 ? RK_FRESH
-                                                                                   : RK_REJECTED;
+  if (received->used_bytes <= r->payload_bytes && received->used_bytes % 8 == 0) return RK_FRESH;
+  ++r->rejected;
+  ++r->rejected_in_a_row;
+  return RK_REJECTED;
 }
+
+/* The last word on a decoded message: its stamp must be neither in the future nor before the last
+ * one's. Counts; pass the result of rk_decode_*. 9.2 */
+static inline enum rk_verdict rk_accept(rk_reader *r, const rk_received *received,
+                                        enum rk_verdict verdict, uint64_t now_ns) {
+  if (verdict == RK_SOUND &&
+      (received->stamp_ns > now_ns + 1000000u || received->stamp_ns < r->stamp_ns)) {
+    verdict = RK_BAD_RANGE;
+  }
+  if (verdict == RK_SOUND) {
+    r->rejected_in_a_row = 0;
+    r->stamp_ns = received->stamp_ns;
+  } else {
+    ++r->rejected;
+    ++r->rejected_in_a_row;
+  }
+  return verdict;
+}
+
+/* Ten rejections in a row, or RK_BACKWARDS: detach until the object changes. 9.2-6 */
+static inline int rk_hopeless(const rk_reader *r) { return r->rejected_in_a_row >= 10; }
 
 /* Copies the newest message into `words`, `room_bytes` at most. 4.3 */
 static inline enum rk_read_status rk_read_latest(rk_reader *r, uint64_t *words, size_t room_bytes,
@@ -946,12 +971,13 @@ static inline uint64_t rk_state(const rk_view *view) {
 static inline uint64_t rk_heartbeat_of(const rk_view *view) {
   return __atomic_load_n(&view->shared->heartbeat_ns, __ATOMIC_RELAXED);
 }
-/* Does its owner live? Does the name still lead to it? System calls, for 10 Hz. */
+/* Does its owner live? Does the name lead to another object? (One that is gone is no end: 5.4-3.)
+ * System calls, for 10 Hz. */
 static inline int rk_owner_alive(const rk_view *view) { return rk_owner_locked(view->descriptor); }
-static inline int rk_is_current(const rk_view *view) {
+static inline int rk_replaced(const rk_view *view) {
   struct stat status;
-  return lstat(view->path, &status) == 0 && status.st_dev == view->device &&
-         status.st_ino == view->inode;
+  return lstat(view->path, &status) == 0 &&
+         (status.st_dev != view->device || status.st_ino != view->inode);
 }
 
 static inline enum rk_attach_status rk_attach_failed(rk_view *view, enum rk_attach_status status,
@@ -1104,7 +1130,7 @@ static inline int rk_take_role(rk_segment *own, const char *instance, uint32_t r
   struct flock lock = rk_lock_on_byte_0(F_WRLCK);
   rk_runtime_directory(folder);
   if (mkdir(folder, 0700) != 0 && errno != EEXIST) {
-    return rk_create_failed(own, RK_EXIT_CONFIG, folder, errno);
+    return rk_create_failed(own, RK_EXIT_CONFIG, "cannot make the runtime directory", errno);
   }
   if (lstat(folder, &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != geteuid()) {
     return rk_create_failed(own, RK_EXIT_CONFIG, "the runtime directory is not this user's", 0);

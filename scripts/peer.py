@@ -1547,7 +1547,8 @@ def run_haptic(arguments):
 
 def run_codec(arguments):
     """Each message of the file: type, used_bytes, blocks, length (u32 each), payload. For each the answer:
-    1 if it is sound, used_bytes, blocks, length, payload as encoded here; else four zeros."""
+    1 if it is sound, used_bytes, blocks, length, payload as encoded here; else four zeros. Type 0 is a
+    segment's header, with the object's size and the role in place of used_bytes and blocks."""
     with open(arguments.messages, "rb") as file:
         data = file.read()
     at = 0
@@ -1555,12 +1556,16 @@ def run_codec(arguments):
         while at < len(data):
             type_id, used, bits, length = struct.unpack_from("<4I", data, at)
             at += 16
-            message = MESSAGES[type_id]
+            content = data[at:at + length]
+            payload, encoded_bits = b"", 0
             try:
-                decoded = message.decode(data[at:at + length], used, bits)
-                payload, encoded_bits = message.encode(decoded)
+                if type_id == 0:
+                    check_header(content, used, bits)
+                else:
+                    message = MESSAGES[type_id]
+                    payload, encoded_bits = message.encode(message.decode(content, used, bits))
                 answers.write(struct.pack("<4I", 1, len(payload), encoded_bits, len(payload)) + payload)
-            except Nonsense:
+            except (Nonsense, Incompatible):
                 answers.write(struct.pack("<4I", 0, 0, 0, 0))
             at += length
 
