@@ -62,12 +62,15 @@ void HapticLoop::Stop() noexcept {
 // A world that was replaced is read once more before it is let go: its last frame may cover impulses that
 // would be declared lost otherwise.
 WorldInput HapticLoop::ReadWorld() noexcept {
+  const auto read_latest = [this] {
+    return frames_.ReadLatest(frame_, static_cast<std::uint64_t>(MonotonicNow()));
+  };
   // Asked before the last look: what the dead one published is then all there.
   const bool has_next = link_.HasNext();
-  protocol::ReadStatus read = frames_.ReadLatest(frame_);
+  protocol::ReadStatus read = read_latest();
   if (read != protocol::ReadStatus::kFresh && has_next) {
     frames_ = link_.TakeNext()->Reader<protocol::WorldFrame>();
-    read = frames_.ReadLatest(frame_);
+    read = read_latest();
   }
   if (frames_.hopeless()) link_.Refuse();
   const protocol::PeerView* view = link_.current();

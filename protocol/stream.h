@@ -36,18 +36,25 @@ class MessageWriter {
   std::array<std::uint64_t, StreamOf<Message>::kBytes / 8> words_{};
 };
 
+/// A reader that has no clock asks with this: stamps and counters are then not held against one.
+inline constexpr std::uint64_t kNoClock = ~std::uint64_t{0};
+/// How far in the future a stamp may lie. SPEC.md 9.2-8.
+inline constexpr std::uint64_t kStampSlackNs = 1'000'000;
+
 template <typename Message>
 class MessageReader {
  public:
   MessageReader() = default;
-  explicit MessageReader(const StreamReader& reader) noexcept : reader_(reader) {}
+  /// `period_ns`: of the stream's directory; 0 = aperiodic.
+  explicit MessageReader(const StreamReader& reader, std::uint64_t period_ns = 0) noexcept
+      : reader_(reader), period_ns_(period_ns) {}
 
-  /// Unless kFresh, `message` is untouched. // RT:
-  ReadStatus ReadLatest(Message& message) noexcept {
-    return Accept(reader_.ReadLatest(words_, received_), message);
+  /// Unless kFresh, `message` is untouched. `now_ns`: CLOCK_MONOTONIC just before the call. // RT:
+  ReadStatus ReadLatest(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    return Accept(reader_.ReadLatest(words_, received_), message, now_ns);
   }
-  ReadStatus ReadNext(Message& message) noexcept {
-    return Accept(reader_.ReadNext(words_, received_), message);
+  ReadStatus ReadNext(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    return Accept(reader_.ReadNext(words_, received_), message, now_ns);
   }
 
   const StreamReader& ring() const noexcept { return reader_; }
@@ -63,14 +70,18 @@ class MessageReader {
   }
 
  private:
-  ReadStatus Accept(ReadStatus status, Message& message) noexcept {
+  ReadStatus Accept(ReadStatus status, Message& message, std::uint64_t now_ns) noexcept {
+    if (status == ReadStatus::kFresh && Jumped(now_ns)) status = ReadStatus::kBackwards;
     if (status == ReadStatus::kBackwards) backwards_ = true;
     if (status == ReadStatus::kRejected) {
       refusal_ = DecodeStatus::kLength;
+    } else if (status == ReadStatus::kFresh && !StampIsSound(now_ns)) {
+      refusal_ = DecodeStatus::kStamp;
     } else if (status == ReadStatus::kFresh) {
       refusal_ = Decode(words_, {received_.used_bytes, received_.blocks}, message);
       if (refusal_ == DecodeStatus::kOk) {
         rejected_in_a_row_ = 0;
+        stamp_ns_ = received_.stamp_ns;
         return status;
       }
     } else {
@@ -81,7 +92,28 @@ class MessageReader {
     return ReadStatus::kRejected;
   }
 
+  bool StampIsSound(std::uint64_t now_ns) const noexcept {
+    if (received_.stamp_ns < stamp_ns_) return false;
+    return now_ns == kNoClock || received_.stamp_ns <= now_ns ||
+           received_.stamp_ns - now_ns <= kStampSlackNs;
+  }
+
+  /// The counter has grown faster than any writer of this period can be meant to. SPEC.md 9.2-9.
+  bool Jumped(std::uint64_t now_ns) noexcept {
+    if (now_ns == kNoClock || period_ns_ == 0) return false;
+    const std::uint64_t periods = looked_ns_ == 0 ? 0 : (now_ns - looked_ns_) / period_ns_;
+    const bool first = looked_ns_ == 0;
+    const std::uint64_t grown = received_.number - looked_number_;
+    looked_ns_ = now_ns;
+    looked_number_ = received_.number;
+    return !first && grown / 4 > periods + reader_.slot_count();
+  }
+
   StreamReader reader_;
+  std::uint64_t period_ns_ = 0;
+  std::uint64_t looked_ns_ = 0;  // when the newest message came; 0 = none yet
+  std::uint64_t looked_number_ = 0;
+  std::uint64_t stamp_ns_ = 0;  // of the message accepted last
   std::array<std::uint64_t, StreamOf<Message>::kBytes / 8> words_{};
   Received received_;
   std::uint64_t rejected_ = 0;

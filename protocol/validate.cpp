@@ -94,6 +94,8 @@ const char* Describe(DecodeStatus status) noexcept {
       return "an orientation is not a unit quaternion";
     case DecodeStatus::kNormal:
       return "a normal has no direction";
+    case DecodeStatus::kStamp:
+      return "its stamp lies in the future or before that of the message before";
   }
   return "unknown";
 }

@@ -19,6 +19,7 @@ enum class DecodeStatus : std::uint32_t {
   kRange,       // a value that cannot be: negative radius, zero period, ...
   kQuaternion,  // norm outside 0.99 .. 1.01
   kNormal,      // norm not above 1e-12
+  kStamp,       // published in the future, or before the message before
 };
 
 /// "a value is not finite", ...
