@@ -96,7 +96,7 @@ void CheckNotKicked(const protocol::PeerView& world) {
 
 TEST_CASE("the pair couples in both orders of start and delivers what it displays") {
   const bool haptic_first = GENERATE(true, false);
-  const std::string instance = FreshInstance();
+  const Instance instance;
   std::optional<Child> haptic;
   std::optional<Child> world;
   if (haptic_first) {
@@ -127,7 +127,7 @@ TEST_CASE("the pair couples in both orders of start and delivers what it display
 }
 
 TEST_CASE("position discards every impulse, and says so") {
-  const std::string instance = FreshInstance();
+  const Instance instance;
   Child world(WorldCommand(instance, "position"));
   Child haptic(HapticCommand(instance));
   TickWatch watch(instance, kSlewLimit);
@@ -141,7 +141,7 @@ TEST_CASE("position discards every impulse, and says so") {
 }
 
 TEST_CASE("a world killed in contact: the force goes to zero in the stated time, and couples again") {
-  const std::string instance = FreshInstance();
+  const Instance instance;
   Child haptic(HapticCommand(instance));
   Child world(WorldCommand(instance));
   TickWatch watch(instance, kSlewLimit);
@@ -173,7 +173,7 @@ TEST_CASE("a world killed in contact: the force goes to zero in the stated time,
 }
 
 TEST_CASE("a haptic side killed in contact: the world goes on, applies what was published, couples again") {
-  const std::string instance = FreshInstance();
+  const Instance instance;
   Child world(WorldCommand(instance));
   const auto world_view = Observe(instance, Role::kWorld);
   protocol::WorldFrame frame;
@@ -212,7 +212,7 @@ TEST_CASE("a haptic side killed in contact: the world goes on, applies what was 
 }
 
 TEST_CASE("a world that sleeps in contact: zero force meanwhile, no kick and no step when it wakes") {
-  const std::string instance = FreshInstance();
+  const Instance instance;
   Child haptic(HapticCommand(instance));
   Child world(WorldCommand(instance));
   TickWatch watch(instance, kSlewLimit);
@@ -244,7 +244,7 @@ TEST_CASE("a world that sleeps in contact: zero force meanwhile, no kick and no 
 }
 
 TEST_CASE("a second daemon of the same role is refused, and the first goes on") {
-  const std::string instance = FreshInstance();
+  const Instance instance;
   Child first(WorldCommand(instance));
   const auto view = Observe(instance, Role::kWorld);
   Child second(WorldCommand(instance));

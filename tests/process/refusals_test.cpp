@@ -15,7 +15,8 @@ using Catch::Matchers::Contains;
 class TemporaryFile {
  public:
   TemporaryFile(const std::string& name, const std::string& text)
-      : path_(std::filesystem::temp_directory_path() / (FreshInstance() + "-" + name)) {
+      : path_(std::filesystem::temp_directory_path() /
+              (static_cast<const std::string&>(Instance()) + "-" + name)) {
     std::ofstream(path_) << text;
   }
   ~TemporaryFile() { std::filesystem::remove(path_); }
@@ -43,7 +44,7 @@ void CheckOneLine(const Refusal& refusal, const std::vector<std::string>& parts)
 }
 
 Refusal RunHaptic(const TemporaryFile& file) {
-  return Run({Program("haptic_server"), "--config", file.path(), "--instance", FreshInstance()});
+  return Run({Program("haptic_server"), "--config", file.path(), "--instance", Instance()});
 }
 
 }  // namespace
