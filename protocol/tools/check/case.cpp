@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "specification.h"
+
 namespace rikiseki::protocol::check {
 
 const char* Name(Verdict verdict) noexcept {
@@ -34,6 +36,31 @@ void Unimplemented(const std::string& text) {
 }
 void Require(bool condition, const std::string& text) {
   if (!condition) Fail(text);
+}
+
+std::string NumberOf(const std::string& id) {
+  const std::size_t begin = id.find('/') + 1;
+  return id.substr(begin, id.find('/', begin) - begin);
+}
+
+std::string SentenceOf(const std::string& number) {
+  const std::string spec = kSpecification;
+  const std::string mark = "\n- [" + number + "] ";
+  std::size_t at = spec.find(mark);
+  if (at == std::string::npos) return {};
+  at += mark.size();
+  std::string sentence;
+  for (; at < spec.size(); ++at) {
+    if (spec[at] != '\n') {
+      sentence += spec[at];
+    } else if (spec.compare(at, 3, "\n  ") == 0) {
+      sentence += ' ';
+      at += 2;
+    } else {
+      break;
+    }
+  }
+  return sentence;
 }
 
 std::string Ms(std::int64_t ns) {

@@ -35,19 +35,20 @@ void Require(bool condition, const std::string& text);
 
 template <typename Player>
 struct Case {
-  const char* id;        // "haptic/5.5/silence": who is judged, section, what
-  const char* section;   // of SPEC.md
-  const char* sentence;  // what it says
+  const char* id;  // "haptic/5.5-2/silence": who is judged, number of the sentence, what
   void (*run)(Player&);
 };
 
 struct Result {
   std::string id;
-  std::string section;
-  std::string sentence;
   Outcome outcome;
   double seconds = 0;
 };
+
+/// The number in a case id: "5.5-2".
+std::string NumberOf(const std::string& id);
+/// The sentence of SPEC.md with that number, on one line; empty if there is none.
+std::string SentenceOf(const std::string& number);
 
 struct PlayOptions {
   std::string instance = "0";

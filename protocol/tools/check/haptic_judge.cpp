@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/clock.h"
 #include "protocol/tools/check/case.h"
 
 namespace rikiseki::protocol::check {
@@ -88,6 +89,12 @@ void HapticJudge::Sequence(const HapticTick& tick, const Received& received) {
     return "message " + std::to_string(received.number) + " carries tick " +
            std::to_string(tick.tick) + ": one message for every tick, from 0";
   });
+  const auto now = static_cast<std::uint64_t>(MonotonicNow());
+  monitor_.Judge(kStamps, received.stamp_ns >= stamp_ns_ && received.stamp_ns <= now, [&] {
+    return "stamp_ns " + std::to_string(received.stamp_ns) + " after " + std::to_string(stamp_ns_) +
+           ", at " + std::to_string(now) + At(tick);
+  });
+  stamp_ns_ = received.stamp_ns;
   if (!any_ || received.number != number_ + 1) return;
   monitor_.Judge(
       kDuration, tick.start_ns - newest_.start_ns == tick.previous_duration_ns, [&] {
@@ -130,6 +137,18 @@ void HapticJudge::Forces(const HapticTick& tick, bool consecutive) {
     const double force = Norm(tick.pointers[i].force);
     monitor_.Judge(kCap, force <= tick.force_cap * (1 + 1e-9), [&] {
       return Num(force) + " N displayed, force_cap is " + Num(tick.force_cap) + At(tick);
+    });
+  }
+  if (tick.world_epoch == 0) {
+    monitor_.Judge(kNoWorld, Norm(TotalForce(tick)) <= kNoForce, [&] {
+      return Num(Norm(TotalForce(tick))) + " N displayed without a world" + At(tick);
+    });
+  }
+  if (consecutive && slew_limit_ > 0) {
+    const double step = Norm(Difference(TotalForce(tick), TotalForce(newest_)));
+    const double most = slew_limit_ * Seconds(tick.period_ns) * (1 + 1e-9) + kNoForce;
+    monitor_.Judge(kSlew, step <= most, [&] {
+      return "the force steps by " + Num(step) + " N, the slew limit allows " + Num(most) + At(tick);
     });
   }
   // 7.3, over all that the device displayed: every channel and the ground.
@@ -193,7 +212,7 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
       const double most =
           (Norm(TotalForce(tick)) * nominal + 1e-9 * tick.force_cap) / kImpulseUnit + 2;
       monitor_.Judge(kOpens,
-                     channel.opened_tick == tick.tick && Largest(channel.impulse) <= most, [&] {
+                     channel.opened_tick <= tick.tick && Largest(channel.impulse) <= most, [&] {
                        return "a channel for body " + std::to_string(channel.body) +
                               " appears with opened_tick " + std::to_string(channel.opened_tick) +
                               " and " + Text(channel.impulse) + " units" + At(tick);

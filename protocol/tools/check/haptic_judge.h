@@ -15,19 +15,24 @@
 namespace rikiseki::protocol::check {
 
 // The sentences, by the ids of their cases.
-inline constexpr char kTickNumbers[] = "haptic/6.1/tick-numbers";
-inline constexpr char kDuration[] = "haptic/6.1/true-duration";
-inline constexpr char kCap[] = "haptic/6.1/force-cap";
-inline constexpr char kNames[] = "haptic/6.1/names-frame";
-inline constexpr char kNeverShown[] = "haptic/9.2/kept-out";
-inline constexpr char kImpulse[] = "haptic/7.3/impulse";
-inline constexpr char kDrift[] = "haptic/7.1/no-drift";
-inline constexpr char kMoment[] = "haptic/7.2/angular-impulse";
-inline constexpr char kContactPoint[] = "haptic/7.2/contact-point";
-inline constexpr char kFirstMoments[] = "haptic/7.3/first-moments";
-inline constexpr char kOpens[] = "haptic/7.2/opens-at-zero";
-inline constexpr char kHasChannel[] = "haptic/7.2/has-channel";
-inline constexpr char kFreed[] = "haptic/7.6/freed-after-ack";
+inline constexpr char kTickNumbers[] = "haptic/6.1-3/tick-numbers";
+inline constexpr char kDuration[] = "haptic/6.1-7/true-duration";
+inline constexpr char kCap[] = "haptic/5.5-7/force-cap";
+inline constexpr char kNames[] = "haptic/6.1-6/names-frame";
+inline constexpr char kNeverShown[] = "haptic/9.2-5/kept-out";
+inline constexpr char kImpulse[] = "haptic/7.3-1/impulse";
+inline constexpr char kDrift[] = "haptic/7.1-1/no-drift";
+inline constexpr char kMoment[] = "haptic/7.2-3/angular-impulse";
+inline constexpr char kContactPoint[] = "haptic/7.2-7/contact-point";
+inline constexpr char kFirstMoments[] = "haptic/7.3-2/first-moments";
+inline constexpr char kOpens[] = "haptic/7.2-8/opens-at-zero";
+inline constexpr char kHasChannel[] = "haptic/7.2-6/has-channel";
+inline constexpr char kStamps[] = "haptic/4.1-4/stamps";
+inline constexpr char kSound[] = "haptic/9.2-3/sound-messages";
+inline constexpr char kSequence[] = "haptic/4.1-2/counter";
+inline constexpr char kNoWorld[] = "haptic/6.1-8/no-world-no-force";
+inline constexpr char kSlew[] = "haptic/5.5-8/slew";
+inline constexpr char kFreed[] = "haptic/7.6-2/freed-after-ack";
 
 /// What is kept of one tick.
 struct SeenTick {
@@ -57,6 +62,9 @@ class HapticJudge {
   /// A body that stands in frames that must not be displayed.
   void PoisonBody(std::uint32_t body) { poisoned_bodies_.insert(body); }
 
+  /// haptic.health states it [N/s]; 0 = not known.
+  void SetSlewLimit(double newtons_per_s) { slew_limit_ = newtons_per_s; }
+
   const std::vector<SeenTick>& seen() const { return seen_; }
   const HapticTick& newest() const { return newest_; }
 
@@ -75,6 +83,8 @@ class HapticJudge {
   std::vector<SeenTick> seen_;
   HapticTick newest_;
   std::uint64_t number_ = 0;
+  std::uint64_t stamp_ns_ = 0;
+  double slew_limit_ = 0;
   bool any_ = false;
 
   std::map<std::uint64_t, std::uint64_t> newest_frame_;  // published, by world epoch

@@ -38,8 +38,12 @@ double Largest(const ImpulseUnits& units) {
 }
 
 std::string Text(const ImpulseUnits& units) {
-  return "(" + std::to_string(units[0]) + ", " + std::to_string(units[1]) + ", " +
-         std::to_string(units[2]) + ")";
+  std::string text;
+  for (const std::int64_t unit : units) {
+    text += text.empty() ? "(" : ", ";
+    text += std::to_string(unit);
+  }
+  return text + ")";
 }
 
 double Norm(const Vector& v) {

@@ -121,11 +121,11 @@ void WorldPlayer::Drain() {
                                    static_cast<std::int64_t>(tick_.previous_duration_ns));
       continue;
     }
-    monitor_.Judge("haptic/6/sound-messages", status != ReadStatus::kRejected, [&] {
+    monitor_.Judge(kSound, status != ReadStatus::kRejected, [&] {
       return std::string("message ") + std::to_string(ticks_.received().number) + ": " +
              Describe(ticks_.refusal());
     });
-    monitor_.Judge("haptic/4.2/sequence-grows", status != ReadStatus::kBackwards,
+    monitor_.Judge(kSequence, status != ReadStatus::kBackwards,
                    [] { return std::string("published of haptic.tick ran backwards"); });
     if (ticks_.ring().cursor() > 0 && status == ReadStatus::kBackwards) {
       ticks_ = peer_->Reader<HapticTick>();
@@ -191,6 +191,7 @@ void WorldPlayer::Step() {
   Drain();
   if (now - last_alive_ns_ > 100'000'000) {
     last_alive_ns_ = now;
+    if (const auto health = Health()) judge_.SetSlewLimit(health->slew_limit);
     if (!peer_->OwnerAlive() || peer_->State() == SegmentState::kClosed) {
       throw SegmentError(1, "the haptic side ended while it was judged");
     }

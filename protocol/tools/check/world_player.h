@@ -27,6 +27,8 @@ class WorldPlayer {
   WorldPlayer(const PlayOptions& options, double patience_s = 10);
   ~WorldPlayer();
 
+  const std::string& instance() const { return options_.instance; }
+
   // ---- The peer.
   const PeerView& peer() const { return *peer_; }
   Monitor& monitor() { return monitor_; }
