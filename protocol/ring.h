@@ -129,6 +129,8 @@ class StreamReader {
   /// of the ring and counts what it lost. At most 3 copies. // RT:
   ReadStatus ReadNext(std::span<std::uint64_t> payload, Received& received) noexcept;
 
+  /// Room for a payload, as the writer's directory says it; 0 without a ring.
+  std::uint32_t payload_bytes() const noexcept { return ring_.payload_bytes; }
   /// The number of the message returned last: where ReadNext goes on.
   std::uint64_t cursor() const noexcept { return cursor_; }
   /// Messages that were overwritten before ReadNext saw them.

@@ -138,4 +138,47 @@ class BodiesReader {
   std::uint32_t count_ = 0;
 };
 
+/// world.scene, whose size the scene decides: published when a scene was loaded, not every tick.
+class SceneWriter {
+ public:
+  SceneWriter() = default;
+  explicit SceneWriter(const StreamWriter& writer)
+      : writer_(writer), words_(writer.payload_bytes() / 8) {}
+
+  /// False, and nothing is published, if it does not fit the room that the stream was made with.
+  bool Publish(const WorldScene& scene, std::uint64_t stamp_ns) noexcept {
+    const Encoded encoded = Encode(scene, std::span<std::uint64_t>(words_));
+    if (encoded.used_bytes == 0) return false;
+    return writer_.Publish(std::span<const std::uint64_t>(words_).first(encoded.used_bytes / 8),
+                           encoded.blocks, stamp_ns);
+  }
+
+ private:
+  StreamWriter writer_;
+  std::vector<std::uint64_t> words_;
+};
+
+class SceneReader {
+ public:
+  SceneReader() = default;
+  explicit SceneReader(const StreamReader& reader)
+      : reader_(reader), words_(reader.payload_bytes() / 8) {}
+
+  /// The newest sound scene read; revision 0 before the first.
+  const WorldScene& scene() const noexcept { return scene_; }
+
+  ReadStatus ReadLatest() {
+    Received received;
+    const ReadStatus status = reader_.ReadLatest(words_, received);
+    if (status != ReadStatus::kFresh) return status;
+    const DecodeStatus decoded = Decode(words_, {received.used_bytes, received.blocks}, scene_);
+    return decoded == DecodeStatus::kOk ? status : ReadStatus::kRejected;
+  }
+
+ private:
+  StreamReader reader_;
+  std::vector<std::uint64_t> words_;
+  WorldScene scene_;
+};
+
 }  // namespace rikiseki::protocol

@@ -12,9 +12,9 @@ namespace rikiseki::protocol {
 enum class DecodeStatus : std::uint32_t {
   kOk,
   kLength,      // used_bytes does not agree with the counts and blocks
-  kCount,       // more pointers, channels, planes or bodies than there may be
+  kCount,       // more pointers, channels, planes, bodies, ... than there may be
   kEnumerator,  // a number that names nothing
-  kIdentity,    // a pointer that does not exist or stands twice
+  kIdentity,    // a pointer or local body that does not exist or stands twice
   kNotFinite,
   kRange,       // a value that cannot be: negative radius, zero period, ...
   kQuaternion,  // norm outside 0.99 .. 1.01
@@ -29,5 +29,6 @@ DecodeStatus Validate(HapticHealth& message) noexcept;
 DecodeStatus Validate(WorldFrame& message) noexcept;  // RT:
 DecodeStatus Validate(WorldHealth& message) noexcept;
 DecodeStatus Validate(Body& message) noexcept;
+DecodeStatus Validate(WorldScene& message) noexcept;
 
 }  // namespace rikiseki::protocol

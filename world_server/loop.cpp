@@ -35,12 +35,15 @@ WorldLoop::WorldLoop(const Settings& settings, WorldStep& step, protocol::Segmen
 
 void WorldLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) {
   loop_health_.missed += static_cast<std::uint64_t>(missed);
+  // Asked before the ledger is drained: who is on offer then has a predecessor that publishes no more.
+  // Asked after it, a stop in between could lose the predecessor's last ticks.
+  const bool has_next = link_.HasNext();
   const bool fresh = DrainLedger();
   WatchPeer(now_ns, fresh);
   step_.Tick(TimeToAdvance(now_ns, missed), frame_);
   Publish(now_ns, deadline_ns);
   // Only after a frame has acknowledged the last tick of the old haptic epoch: it stays delivered.
-  if (link_.HasNext()) TakeNextPeer();
+  if (has_next) TakeNextPeer();
 }
 
 bool WorldLoop::DrainLedger() {
@@ -64,9 +67,8 @@ double WorldLoop::TimeToAdvance(std::int64_t now_ns, std::int64_t missed) {
   // The world follows the time of the impulses it consumed; alone, it follows its own.
   const std::int64_t nominal_ns = period_ns_ * (1 + missed);
   if (world_clock_ns_ == 0) world_clock_ns_ = now_ns - nominal_ns;
-  const std::int64_t target_ns = peer_state_ == protocol::PeerState::kLive
-                                     ? newest_tick_ns_
-                                     : world_clock_ns_ + nominal_ns;
+  const std::int64_t target_ns =
+      peer_state_ == protocol::PeerState::kLive ? newest_tick_ns_ : world_clock_ns_ + nominal_ns;
   const std::int64_t advance_ns =
       std::clamp<std::int64_t>(target_ns - world_clock_ns_, 0, longest_advance_ns_);
   world_clock_ns_ = std::max(world_clock_ns_, target_ns);

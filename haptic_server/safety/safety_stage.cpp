@@ -32,6 +32,8 @@ SafetyStage::SafetyStage(const Settings& settings)
     : settings_(settings.safety),
       period_s_(Seconds(settings.period_ns())),
       largest_step_n_(settings.safety.slew_limit_n_per_s * period_s_ * kBelow),
+      ticks_to_zero_(
+          static_cast<std::int64_t>(std::ceil(settings.safety.force_cap_n / largest_step_n_)) + 1),
       fault_after_misses_(settings.loop.fault_after_misses) {}
 
 ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
@@ -70,8 +72,10 @@ Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   Vec3 change = target - displayed_;
   const bool slewed = Shorten(change, largest_step_n_);
   command_ = slewed ? Vec3(displayed_ + change) : target;
-  // If a device ever displays more than the cap, the cap goes before the slew limit.
+  // Where a device does not follow, the cap and the way to zero go before the slew limit.
   Shorten(command_, settings_.force_cap_n);
+  zero_ticks_ = target.isZero(0) ? zero_ticks_ + 1 : 0;
+  if (zero_ticks_ > ticks_to_zero_) command_.setZero();
   if (!command_.allFinite()) command_.setZero();
 
   if (faulted) {

@@ -50,9 +50,11 @@ class SafetyStage {
 
   SafetySettings settings_;
   double period_s_;
-  double largest_step_n_;  // slew limit times nominal period
+  double largest_step_n_;       // slew limit times nominal period
+  std::int64_t ticks_to_zero_;  // from the cap, at the slew limit
   std::int64_t fault_after_misses_;
   std::int64_t missed_in_a_row_ = 0;
+  std::int64_t zero_ticks_ = 0;  // for so long nothing is wanted
   double gain_ = 0;
   Vec3 command_ = Vec3::Zero();
   Vec3 displayed_ = Vec3::Zero();

@@ -222,8 +222,12 @@ TEST_CASE("Stop lets go and says so; the books take no more") {
   Bench bench;
   bench.Run(400);
   const std::uint64_t tick = bench.message.tick;
-  bench.step.Stop(bench.message);
+  // The loop was told 0.3 ms after its last tick: so long was the last force held.
+  const std::int64_t last_start_ns = bench.now_ns - bench.previous_ns;
+  bench.step.Stop(last_start_ns + 300'000, bench.message);
   REQUIRE(bench.device.released);
+  REQUIRE(bench.message.start_ns == static_cast<std::uint64_t>(last_start_ns + 300'000));
+  REQUIRE(bench.message.previous_duration_ns == 300'000);
   REQUIRE(bench.message.tick == tick + 1);
   REQUIRE(bench.message.pointers[0].reason == ForceReason::kStopped);
   REQUIRE(ToVec3(bench.message.pointers[0].force).isZero(0));
@@ -394,25 +398,29 @@ TEST_CASE(
     Vec3 true_impulse = Vec3::Zero();
     double time_s = 0;
     protocol::HapticTick published;  // the newest that the world can see
+    protocol::WorldFrame made;       // its newest frame, which arrives in tick `due`
+    int due = -1;
     bool alive = true;
     std::map<std::uint64_t, int> worlds_pushed;
     for (int k = 0; k < 40'000; ++k) {
       const protocol::WorldFrame* frame = nullptr;
       if (k > 0 && alive && k % 25 == 0) {
-        protocol::WorldFrame& next = bench.NextFrame();
-        next.period_ns = 25'000'000;
-        if (world_frames++ > 0) world->Read(published, chance(20), next);
-        if (!chance(30)) frame = &next;  // else overwritten by the next before it was looked at
+        made = bench.NextFrame();
+        made.period_ns = 25'000'000;
+        if (world_frames++ > 0) world->Read(published, chance(20), made);
+        // Some frames are overwritten by the next before they are looked at.
+        due = chance(30) ? -1 : k + static_cast<int>(random() % 20);
       }
+      if (alive && k == due) frame = &made;
       if (frame != nullptr && frame->acked_epoch != 0) {
         acked = static_cast<std::int64_t>(frame->acked_tick);
         world_applied = frame->applied;
         world_discarded = frame->discarded;
       }
-      if (alive && chance(100) && random() % 3000 == 0) {  // dies
+      if (alive && random() % 3000 == 0) {  // dies
         alive = false;
-        bench.world.ready = chance(50);
-      } else if (!alive && random() % 400 == 0) {  // restarts
+        bench.world.ready = random() % 2 == 0;
+      } else if (!alive && random() % 200 == 0) {  // restarts, often before its force has faded
         alive = true;
         applied = Plus(applied, world_applied);
         discarded = Plus(discarded, world_discarded);

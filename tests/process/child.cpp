@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -49,6 +50,13 @@ void Child::Signal(int signal) const {
   if (!ended_) kill(pid_, signal);
 }
 
+void Child::Freeze() const {
+  if (ended_) return;
+  Signal(SIGSTOP);
+  siginfo_t info{};
+  waitid(P_PID, static_cast<id_t>(pid_), &info, WSTOPPED | WEXITED | WNOWAIT);
+}
+
 bool Child::IsRunning() {
   if (ended_) return false;
   if (waitpid(pid_, &status_, WNOHANG) != pid_) return true;
@@ -77,15 +85,21 @@ std::string Child::Stderr() const {
   return text.str();
 }
 
-std::string Program(const std::string& name) { return std::string(RIKISEKI_BIN_DIR) + "/" + name; }
+std::string Program(const std::string& name) {
+  return std::string(RIKISEKI_BIN_DIR) + "/" + name;
+}
 
 std::string SourceFile(const std::string& path) {
   return std::string(RIKISEKI_SOURCE_DIR) + "/" + path;
 }
 
-std::string FreshInstance() {
+Instance::Instance() {
   static std::atomic<int> next{0};
-  return "test-" + std::to_string(getpid()) + "-" + std::to_string(next++);
+  name_ = "test-" + std::to_string(getpid()) + "-" + std::to_string(next++);
+}
+
+Instance::~Instance() {
+  for (const char* role : {".haptic", ".world"}) shm_unlink(("/rikiseki." + name_ + role).c_str());
 }
 
 }  // namespace rikiseki::test

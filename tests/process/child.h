@@ -19,6 +19,11 @@ class Child {
 
   void Signal(int signal) const;
 
+  /// SIGSTOP, and waits until it stands still (or has ended).
+  void Freeze() const;
+
+  pid_t pid() const { return pid_; }
+
   /// Waits until it ends, `seconds` at most, then kills it. Returns the exit status, or minus the signal
   /// that ended it.
   int Wait(double seconds = 20);
@@ -41,7 +46,18 @@ std::string Program(const std::string& name);
 /// A file of the source tree.
 std::string SourceFile(const std::string& path);
 
-/// An instance name that no other test uses.
-std::string FreshInstance();
+/// An instance name that no other test uses. Removes what killed daemons left under it: declare it before
+/// them.
+class Instance {
+ public:
+  Instance();
+  ~Instance();
+  Instance(const Instance&) = delete;
+  Instance& operator=(const Instance&) = delete;
+  operator const std::string&() const { return name_; }
+
+ private:
+  std::string name_;
+};
 
 }  // namespace rikiseki::test

@@ -15,7 +15,8 @@ using Catch::Matchers::Contains;
 class TemporaryFile {
  public:
   TemporaryFile(const std::string& name, const std::string& text)
-      : path_(std::filesystem::temp_directory_path() / (FreshInstance() + "-" + name)) {
+      : path_(std::filesystem::temp_directory_path() /
+              (static_cast<const std::string&>(Instance()) + "-" + name)) {
     std::ofstream(path_) << text;
   }
   ~TemporaryFile() { std::filesystem::remove(path_); }
@@ -43,15 +44,15 @@ void CheckOneLine(const Refusal& refusal, const std::vector<std::string>& parts)
 }
 
 Refusal RunHaptic(const TemporaryFile& file) {
-  return Run({Program("haptic_server"), "--config", file.path(), "--instance", FreshInstance()});
+  return Run({Program("haptic_server"), "--config", file.path(), "--instance", Instance()});
 }
 
 }  // namespace
 
 TEST_CASE("an unknown key") {
   const TemporaryFile file("bad.ini", "[render]\n# a comment\nstifness_n_per_m = 2000\n");
-  CheckOneLine(RunHaptic(file), {file.path() + ":3", "render.stifness_n_per_m", "2000",
-                                 "render.stiffness_n_per_m"});
+  CheckOneLine(RunHaptic(file),
+               {file.path() + ":3", "render.stifness_n_per_m", "2000", "render.stiffness_n_per_m"});
 }
 
 TEST_CASE("a wrong value") {
@@ -86,7 +87,8 @@ TEST_CASE("a missing scene") {
 }
 
 TEST_CASE("a broken SDF") {
-  const TemporaryFile file("bad.sdf", "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n");
+  const TemporaryFile file("bad.sdf",
+                           "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n");
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", file.path()}),
                {file.path()});
@@ -97,11 +99,12 @@ TEST_CASE("an SDF that names no world, and one with a shape of nonsense size") {
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", empty.path()}),
                {empty.path(), "world"});
-  const TemporaryFile negative("bad.sdf",
-                               "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n"
-                               "<model name='m'><link name='l'><collision name='c'><geometry><box>\n"
-                               "<size>-1 1 1</size></box></geometry></collision></link></model>\n"
-                               "</world></sdf>\n");
+  const TemporaryFile negative(
+      "bad.sdf",
+      "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n"
+      "<model name='m'><link name='l'><collision name='c'><geometry><box>\n"
+      "<size>-1 1 1</size></box></geometry></collision></link></model>\n"
+      "</world></sdf>\n");
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", negative.path()}),
                {negative.path() + ":4", "box", "above 0"});

@@ -39,7 +39,7 @@ pid_t StartWriter(const std::string& instance, const std::string& folder) {
 
 TEST_CASE("a writer killed at a random instant leaves nothing torn, and its newest message whole") {
   const bool full = std::getenv("RIKISEKI_FULL") != nullptr;
-  const int kills = full ? 1000 : 60;
+  const int kills = full ? 2000 : 100;
   const TemporaryFolder folder;
   const std::string instance = FreshInstance();
   std::mt19937 random(5);

@@ -79,6 +79,22 @@ TEST_CASE("the slew limit holds against what was displayed, not what was command
   REQUIRE(bench.stage.reason() == ForceReason::kSlewLimited);
 }
 
+TEST_CASE("a device that does not follow cannot hold the command up") {
+  Settings settings;
+  settings.safety.force_cap_n = 2;
+  settings.safety.slew_limit_n_per_s = 200;  // 0.2 N a tick: 11 ticks from the cap to zero
+  Bench bench(settings);
+  bench.Run(300, kPush);
+  bench.input.peer = PeerState::kLost;
+  bench.input.wanted = kPush;
+  int ticks = 0;
+  for (; !bench.stage.is_zero() && ticks < 1000; ++ticks) {
+    bench.stage.Limit(bench.input);
+    bench.stage.Displayed(Vec3(1.5, 0, 0));
+  }
+  REQUIRE(ticks <= 80 + 13);
+}
+
 TEST_CASE("small tension residues are not worth a reason") {
   Bench bench;
   bench.Run(300, kPush);
