@@ -53,6 +53,9 @@ void HapticJudge::FramePublished(std::uint64_t epoch, std::uint64_t number,
     shown_.clear();
     shown_epoch_ = epoch;
   }
+  for (const Plane& plane : planes) {
+    if (poisoned_bodies_.count(plane.body) != 0) return;  // nobody may take this one for shown
+  }
   Shown shown{{planes.begin(), planes.end()}, 0};
   const auto before = shown_.find(number - 1);
   if (before != shown_.end() && SameBodies(before->second.planes, planes)) {

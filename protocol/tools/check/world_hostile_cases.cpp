@@ -102,12 +102,12 @@ void FarFinger(HapticPlayer& player) {
 void Detached(HapticPlayer& player, const char* what) {
   const std::uint64_t last = player.tick();
   player.Run(Frames(player, 6) + 0.2);
-  Require(player.newest().acked_epoch != player.segment().epoch() ||
-              player.newest().acked_tick <= last,
-          std::string(what) + ", and ticks after it are acknowledged");
+  const bool left = player.newest().acked_epoch != player.segment().epoch() ||
+                    player.newest().acked_tick <= last;
   player.Close();
   player.Open();
   player.Couple();
+  Require(left, std::string(what) + ", and ticks after it are acknowledged");
 }
 
 void TenInARow(HapticPlayer& player) {

@@ -14,6 +14,7 @@ namespace {
 constexpr std::int64_t kStepNs = 1'000'000;
 constexpr double kApproachPerFrame = 0.0004;  // m
 constexpr double kPressForce = 0.5;           // N: enough to be seen, gentle for a person
+constexpr std::int64_t kRestNs = 80'000'000;  // at rest when the force holds this long
 constexpr double kFarthestPress = 0.04;       // m
 
 std::unique_ptr<PeerView> WaitForPeer(const std::string& instance, Role role, double patience_s) {
@@ -269,15 +270,28 @@ void WorldPlayer::Press() {
   planes = {plane};
   if (!options_.has_target) {
     animate = [this, finger, normal, depth]() mutable {
-      if (Force() >= kPressForce || depth > kFarthestPress) return;
-      depth += kApproachPerFrame;
+      const double force = Force();
+      if (force >= kPressForce || depth > kFarthestPress) return;
+      depth += force < kZeroForce ? kApproachPerFrame : kApproachPerFrame / 4;
       planes[0].point = Sum(finger.position, Scaled(normal, depth - finger.radius));
     };
   }
-  const bool felt = Until([&] { return Force() >= kPressForce; }, 8);
+  // A finger that yields bounces before it rests against the surface; one that presses by a script
+  // comes and goes.
+  bool felt = false;
+  std::int64_t since = 0;
+  const bool rests = Until(
+      [&] {
+        felt = felt || Force() >= kPressForce;
+        if (Force() < kPressForce / 2) since = MonotonicNow();
+        return felt && MonotonicNow() - since > kRestNs;
+      },
+      6);
   animate = nullptr;
   Require(felt, "no force after our surface was brought into the finger");
-  Run(0.05);
+  if (!rests) {
+    Require(Until([&] { return Force() >= kPressForce / 2; }, 6), "the force does not come again");
+  }
 }
 
 void WorldPlayer::Release() {
