@@ -83,10 +83,8 @@ void ConfigSchema::Add(const std::string& key, Entry entry) {
 
 void ConfigSchema::Number(const std::string& key, double* target, double low, double high,
                           const std::string& doc) {
-  Add(key, {.assign =
-                [=](const std::string& value, const std::string&) {
-                  *target = ParseWhole<double>(value, low, high);
-                },
+  Add(key, {.assign = [=](const std::string& value,
+                          const std::string&) { *target = ParseWhole<double>(value, low, high); },
             .show = [=] { return Show(*target); },
             .expected = "a number" + RangeText(low, high),
             .doc = doc});
@@ -94,10 +92,8 @@ void ConfigSchema::Number(const std::string& key, double* target, double low, do
 
 void ConfigSchema::Integer(const std::string& key, int* target, int low, int high,
                            const std::string& doc) {
-  Add(key, {.assign =
-                [=](const std::string& value, const std::string&) {
-                  *target = ParseWhole<int>(value, low, high);
-                },
+  Add(key, {.assign = [=](const std::string& value,
+                          const std::string&) { *target = ParseWhole<int>(value, low, high); },
             .show = [=] { return std::to_string(*target); },
             .expected = "a whole number" + RangeText(low, high),
             .doc = doc});
@@ -129,10 +125,8 @@ void ConfigSchema::Path(const std::string& key, std::string* target, const std::
 
 void ConfigSchema::Vector(const std::string& key, Vec3* target, double low, double high,
                           const std::string& doc) {
-  Add(key, {.assign =
-                [=](const std::string& value, const std::string&) {
-                  *target = ParseVector(value, low, high);
-                },
+  Add(key, {.assign = [=](const std::string& value,
+                          const std::string&) { *target = ParseVector(value, low, high); },
             .show = [=] { return Show(*target); },
             .expected = "three numbers `x y z`, each" + RangeText(low, high),
             .doc = doc});
@@ -154,7 +148,8 @@ void ConfigSchema::Vectors(const std::string& key, std::vector<Vec3>* target, do
             .show =
                 [=] {
                   std::string text;
-                  for (const Vec3& vector : *target) text += (text.empty() ? "" : ", ") + Show(vector);
+                  for (const Vec3& vector : *target)
+                    text += (text.empty() ? "" : ", ") + Show(vector);
                   return text;
                 },
             .expected = "vectors `x y z, x y z, ...`, each number" + RangeText(low, high),
@@ -181,11 +176,12 @@ void ConfigSchema::Assign(const std::string& key, const std::string& value,
                           const std::string& origin, const std::string& folder) {
   const auto entry = entries_.find(key);
   if (entry == entries_.end()) {
-    const auto nearest = std::min_element(
-        entries_.begin(), entries_.end(), [&](const auto& a, const auto& b) {
+    const auto nearest =
+        std::min_element(entries_.begin(), entries_.end(), [&](const auto& a, const auto& b) {
           return EditDistance(a.first, key) < EditDistance(b.first, key);
         });
-    throw ConfigError(origin + ": " + key + " = " + value + ": there is no such key; did you mean " +
+    throw ConfigError(origin + ": " + key + " = " + value +
+                      ": there is no such key; did you mean " +
                       (nearest == entries_.end() ? "none" : nearest->first) + "?");
   }
   try {

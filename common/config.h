@@ -35,7 +35,8 @@ class ConfigSchema {
   /// A path; a relative one is resolved against the folder of the file that gives it.
   void Path(const std::string& key, std::string* target, const std::string& doc);
   /// Three numbers, each within the range.
-  void Vector(const std::string& key, Vec3* target, double low, double high, const std::string& doc);
+  void Vector(const std::string& key, Vec3* target, double low, double high,
+              const std::string& doc);
   /// Any number of vectors on one line, separated by commas.
   void Vectors(const std::string& key, std::vector<Vec3>* target, double low, double high,
                const std::string& doc);

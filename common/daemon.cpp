@@ -29,14 +29,15 @@ DaemonOptions ParseDaemonOptions(int argc, char** argv, const std::string& progr
   DaemonOptions options;
   options.extra.resize(extra.size());
   po::options_description description(program + ": " + purpose);
-  description.add_options()
-      ("config", po::value(&options.config)->value_name("FILE"), "settings; every key is explained there")
-      ("set", po::value(&options.set)->value_name("section.key=value")->composing(),
-       "overrides one setting; may be repeated")
-      ("instance", po::value(&options.instance)->value_name("NAME"), "which pair of daemons (default 0)")
-      ("check", po::bool_switch(&options.check), "validates the settings, prints them and what would run")
-      ("version", "prints the version")
-      ("help", "prints this");
+  description.add_options()("config", po::value(&options.config)->value_name("FILE"),
+                            "settings; every key is explained there")(
+      "set", po::value(&options.set)->value_name("section.key=value")->composing(),
+      "overrides one setting; may be repeated")("instance",
+                                                po::value(&options.instance)->value_name("NAME"),
+                                                "which pair of daemons (default 0)")(
+      "check", po::bool_switch(&options.check),
+      "validates the settings, prints them and what would run")("version", "prints the version")(
+      "help", "prints this");
   for (std::size_t i = 0; i < extra.size(); ++i) {
     description.add_options()(extra[i].name.c_str(),
                               po::value(&options.extra[i])->value_name(extra[i].value_name),
@@ -65,7 +66,8 @@ DaemonOptions ParseDaemonOptions(int argc, char** argv, const std::string& progr
   if (options.config.empty()) throw StartError(kExitUsage, "--config FILE is required; try --help");
   for (const char c : options.instance) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '_' && c != '-') {
-      throw StartError(kExitUsage, "--instance " + options.instance + ": letters, digits, _ and - only");
+      throw StartError(kExitUsage,
+                       "--instance " + options.instance + ": letters, digits, _ and - only");
     }
   }
   if (options.instance.empty() || options.instance.size() > 64) {
@@ -93,7 +95,8 @@ void BlockSignals() {
 
 int WaitForSignal(int milliseconds) {
   const sigset_t signals = WatchedSignals();
-  const timespec timeout{.tv_sec = milliseconds / 1000, .tv_nsec = (milliseconds % 1000) * 1'000'000L};
+  const timespec timeout{.tv_sec = milliseconds / 1000,
+                         .tv_nsec = (milliseconds % 1000) * 1'000'000L};
   const int signal = sigtimedwait(&signals, nullptr, &timeout);
   return signal > 0 ? signal : 0;
 }

@@ -8,9 +8,9 @@
 namespace rikiseki {
 
 struct DaemonOptions {
-  std::string config;              // required
-  std::vector<std::string> set;    // section.key=value
-  std::string instance = "0";      // which pair: names the segments
+  std::string config;            // required
+  std::vector<std::string> set;  // section.key=value
+  std::string instance = "0";    // which pair: names the segments
   bool check = false;
   std::vector<std::string> extra;  // values of the daemon's own options, in the order declared
 };

@@ -8,9 +8,9 @@ namespace rikiseki {
 
 inline constexpr int kExitOk = 0;
 inline constexpr int kExitFault = 1;
-inline constexpr int kExitUsage = 64;   // wrong command line: do not restart
+inline constexpr int kExitUsage = 64;      // wrong command line: do not restart
 inline constexpr int kExitTemporary = 75;  // somebody else holds the role: try again
-inline constexpr int kExitConfig = 78;  // wrong configuration: do not restart
+inline constexpr int kExitConfig = 78;     // wrong configuration: do not restart
 
 /// A reason not to start, with the exit status that tells it. what() is one line for people.
 class StartError : public std::runtime_error {

@@ -27,9 +27,17 @@ struct Pose {
   }
 };
 
-inline Vec3 ToVec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-inline std::array<double, 3> ToArray(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
-inline Quat ToQuat(const std::array<double, 4>& q) { return {q[0], q[1], q[2], q[3]}; }
-inline std::array<double, 4> ToArray(const Quat& q) { return {q.w(), q.x(), q.y(), q.z()}; }
+inline Vec3 ToVec3(const std::array<double, 3>& v) {
+  return {v[0], v[1], v[2]};
+}
+inline std::array<double, 3> ToArray(const Vec3& v) {
+  return {v.x(), v.y(), v.z()};
+}
+inline Quat ToQuat(const std::array<double, 4>& q) {
+  return {q[0], q[1], q[2], q[3]};
+}
+inline std::array<double, 4> ToArray(const Quat& q) {
+  return {q.w(), q.x(), q.y(), q.z()};
+}
 
 }  // namespace rikiseki

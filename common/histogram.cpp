@@ -34,8 +34,8 @@ std::int64_t HistogramLowerEdge(std::size_t bucket) noexcept {
 std::int64_t HistogramQuantile(const HistogramCounts& counts, double fraction) noexcept {
   const std::uint64_t total = HistogramTotal(counts);
   if (total == 0) return 0;
-  const auto wanted =
-      static_cast<std::uint64_t>(std::ceil(std::clamp(fraction, 0.0, 1.0) * static_cast<double>(total)));
+  const auto wanted = static_cast<std::uint64_t>(
+      std::ceil(std::clamp(fraction, 0.0, 1.0) * static_cast<double>(total)));
   std::uint64_t seen = 0;
   for (std::size_t bucket = 0; bucket < kHistogramSize; ++bucket) {
     seen += counts[bucket];

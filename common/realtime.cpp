@@ -86,10 +86,14 @@ std::string LockMemory() {
 
 std::string PolicyName(int policy, int priority) {
   switch (policy) {
-    case SCHED_FIFO: return "SCHED_FIFO " + std::to_string(priority);
-    case SCHED_RR: return "SCHED_RR " + std::to_string(priority);
-    case SCHED_OTHER: return "SCHED_OTHER";
-    default: return "policy " + std::to_string(policy);
+    case SCHED_FIFO:
+      return "SCHED_FIFO " + std::to_string(priority);
+    case SCHED_RR:
+      return "SCHED_RR " + std::to_string(priority);
+    case SCHED_OTHER:
+      return "SCHED_OTHER";
+    default:
+      return "policy " + std::to_string(policy);
   }
 }
 
@@ -106,7 +110,9 @@ RealtimeThread::RealtimeThread(const RealtimeRequest& request, std::function<voi
   obtained_ = obtained.get();
 }
 
-RealtimeThread::~RealtimeThread() { Join(); }
+RealtimeThread::~RealtimeThread() {
+  Join();
+}
 
 void RealtimeThread::Join() {
   if (joined_) return;

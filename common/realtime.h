@@ -12,8 +12,8 @@
 namespace rikiseki {
 
 struct RealtimeRequest {
-  int fifo_priority = 0;         // 1..99; 0 = stay with the ordinary scheduler
-  int cpu = -1;                  // pin to this one; -1 = leave it to the scheduler
+  int fifo_priority = 0;                 // 1..99; 0 = stay with the ordinary scheduler
+  int cpu = -1;                          // pin to this one; -1 = leave it to the scheduler
   std::size_t stack_bytes = 512 * 1024;  // locked and touched before the loop starts
 };
 

@@ -17,7 +17,8 @@ constexpr std::int64_t kHealthPeriodNs = 10'000'000;
 HapticLoop::HapticLoop(const Settings& settings, HapticStep& step, protocol::SegmentOwner& owner,
                        protocol::PeerLink& link)
     : period_ns_(settings.period_ns()),
-      health_every_(std::max<std::uint64_t>(1, static_cast<std::uint64_t>(kHealthPeriodNs / period_ns_))),
+      health_every_(
+          std::max<std::uint64_t>(1, static_cast<std::uint64_t>(kHealthPeriodNs / period_ns_))),
       step_(step),
       owner_(owner),
       link_(link),

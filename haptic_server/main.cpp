@@ -90,11 +90,10 @@ int Run(int argc, char** argv) {
        .build = kBuild,
        .runtime_directory = ""});
   for (const std::string& note : owner.notes()) spdlog::info("{}", note);
-  protocol::PeerLink link(
-      {.peer = {.instance = options.instance,
-                .role = protocol::Role::kWorld,
-                .required = {{.type = protocol::StreamType::kWorldFrame}},
-                .owners = {}}});
+  protocol::PeerLink link({.peer = {.instance = options.instance,
+                                    .role = protocol::Role::kWorld,
+                                    .required = {{.type = protocol::StreamType::kWorldFrame}},
+                                    .owners = {}}});
   HapticStep step(settings, *device, owner.epoch());
   HapticLoop loop(settings, step, owner, link);
 

@@ -17,7 +17,7 @@ struct LoopSettings {
   int fifo_priority = 80;
   int cpu = -1;
   RealtimePolicy realtime = RealtimePolicy::kIgnore;
-  int fault_after_misses = 20;  // deadlines in a row: force to zero
+  int fault_after_misses = 20;           // deadlines in a row: force to zero
   double longest_world_period_ms = 200;  // sizes the ring: slots >= 4 (Tw + latency) / T
 };
 
@@ -36,10 +36,10 @@ struct SafetySettings {
   double force_cap_n = 10;
   double slew_limit_n_per_s = 5000;
   double speed_limit_m_per_s = 3;
-  double soft_start_ms = 200;   // the force grows over this after a world came
-  double fade_ms = 80;          // ... and goes to zero over this when it is lost
-  double late_periods = 2.5;    // no frame for this many world periods: hold
-  double lost_periods = 5;      // ... for this many, and at least lost_floor_ms: lost
+  double soft_start_ms = 200;  // the force grows over this after a world came
+  double fade_ms = 80;         // ... and goes to zero over this when it is lost
+  double late_periods = 2.5;   // no frame for this many world periods: hold
+  double lost_periods = 5;     // ... for this many, and at least lost_floor_ms: lost
   double lost_floor_ms = 250;
 };
 
@@ -63,19 +63,19 @@ struct HandSettings {
   Vec3 stroke_mm = Vec3(110, 0, 0);  // the reach of one push
   double reach_ms = 300;             // there
   double hold_ms = 100;
-  double return_ms = 300;            // and back
-  double rest_ms = 500;              // between two pushes, plus a random part
-  double rest_jitter_ms = 100;       // uniform from 0 to this: meets every phase of the world
+  double return_ms = 300;       // and back
+  double rest_ms = 500;         // between two pushes, plus a random part
+  double rest_jitter_ms = 100;  // uniform from 0 to this: meets every phase of the world
   int seed = 1;
 };
 
 /// Motor positions and electronics of a 4-string SPIDAR. notes of config/devices/*.ini.
 struct SpidarSettings {
-  std::vector<Vec3> motors_m;         // in device axes
-  double count_length_m = 2.92406e-5; // string length per encoder count
+  std::vector<Vec3> motors_m;          // in device axes
+  double count_length_m = 2.92406e-5;  // string length per encoder count
   double tension_min_n = 0.5;
   double tension_max_n = 20;
-  double velocity_cutoff_hz = 100;    // of the first-order velocity filter
+  double velocity_cutoff_hz = 100;  // of the first-order velocity filter
   double moving_mass_kg = 0.03;
   double friction_damping_ns_per_m = 0.2;
 };

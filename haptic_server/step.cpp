@@ -132,7 +132,7 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   }
   if (fresh && peer.Accepts(world.epoch)) {
     if (channel_epoch != world.epoch) {
-      ledger.FreeChannels();
+      ledger.BeginWorld(world.epoch);
       channel_epoch = world.epoch;
     }
     // A surface as deep as the present contact, or as the finger gets in a tick or two, is no

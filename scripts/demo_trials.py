@@ -38,61 +38,86 @@ class Pair:
     def __init__(self, arguments, coupling, logs):
         self.instance = f"demo-{os.getpid()}-{coupling}"
         self.logs = logs
-        world = [f"{arguments.bin}/world_server", "--config", f"{arguments.config}/world_server.ini",
-                 "--instance", self.instance, "--set", f"coupling.coupling={coupling}",
-                 "--set", f"loop.rate_hz={arguments.world_rate:g}"]
-        haptic = [f"{arguments.bin}/haptic_server", "--config", f"{arguments.config}/haptic_server.ini",
-                  "--instance", self.instance]
-        status = [f"{arguments.bin}/haptic_status", "--instance", self.instance, "--json",
-                  "--interval", "0.05"]
-        self.world = self._start(world, "world_server.log")
-        self.haptic = self._start(haptic, "haptic_server.log")
-        self._wait_until_up()
-        self.status = subprocess.Popen(status, stdout=subprocess.PIPE, text=True)
+        self.commands = {
+            "world_server": [f"{arguments.bin}/world_server", "--config", f"{arguments.config}/world_server.ini",
+                             "--instance", self.instance, "--set", f"coupling.coupling={coupling}",
+                             "--set", f"loop.rate_hz={arguments.world_rate:g}"],
+            "haptic_server": [f"{arguments.bin}/haptic_server", "--config", f"{arguments.config}/haptic_server.ini",
+                              "--instance", self.instance],
+            "haptic_status": [f"{arguments.bin}/haptic_status", "--instance", self.instance, "--json",
+                              "--interval", "0.05"],
+        }
+        self.daemons = {}
+        self.status = None
 
-    def _start(self, command, log):
+    def start(self):
+        for name in ("world_server", "haptic_server"):
+            self.daemons[name] = self._start(name)
+        self._wait_until_up()
+        self.status = self._start("haptic_status", stdout=subprocess.PIPE, text=True)
+
+    def _start(self, name, **options):
         # A Ctrl-C is for this script, which then stops its children in order.
-        with open(os.path.join(self.logs, log), "ab") as file:
-            return subprocess.Popen(command, stderr=file, start_new_session=True)
+        with open(os.path.join(self.logs, name + ".log"), "ab") as file:
+            return subprocess.Popen(self.commands[name], stderr=file, start_new_session=True, **options)
 
     def _wait_until_up(self):
         for _ in range(100):
-            self.check_alive()
+            for name, process in self.daemons.items():
+                if process.poll() is not None:
+                    self._give_up(name)
             if all(os.path.exists(f"/dev/shm/rikiseki.{self.instance}.{role}") for role in ("haptic", "world")):
                 return
             time.sleep(0.05)
         raise RuntimeError("the daemons did not start")
 
-    def check_alive(self):
-        for name, process in (("haptic_server", self.haptic), ("world_server", self.world)):
-            if process.poll() is not None:
-                with open(os.path.join(self.logs, name + ".log"), encoding="utf-8") as log:
-                    raise RuntimeError(f"{name} ended with {process.returncode}: {log.read()[-2000:]}")
+    def _give_up(self, name):
+        with open(os.path.join(self.logs, name + ".log"), encoding="utf-8") as log:
+            raise RuntimeError(f"{name} ended with {self.daemons[name].returncode}: {log.read()[-2000:]}")
+
+    def restart_the_dead(self):
+        """As systemd would: what a signal ended is started again. Returns the names."""
+        restarted = []
+        for name, process in self.daemons.items():
+            if process.poll() is None:
+                continue
+            if process.returncode >= 0:
+                self._give_up(name)
+            time.sleep(0.5)
+            self.daemons[name] = self._start(name)
+            restarted.append(f"{name} was ended by signal {-process.returncode} and started again")
+        return restarted
 
     def readings(self, until):
         while time.monotonic() < until:
+            for news in self.restart_the_dead():
+                print(f"{news:110s}", flush=True)
             line = self.status.stdout.readline()
             if not line:
-                self.check_alive()
                 raise RuntimeError("haptic_status ended")
             reading = json.loads(line)
-            if reading["books"] and "newest" in reading["haptic"] and "newest" in reading["world"]:
+            if reading["books"] and all("newest" in reading[side] for side in ("haptic", "world")):
                 yield reading
 
     def reset_scene(self):
-        self.world.send_signal(signal.SIGHUP)
+        self.daemons["world_server"].send_signal(signal.SIGHUP)
 
     def stop(self):
-        for process in (getattr(self, "status", None), self.haptic, self.world):
-            if process is not None and process.poll() is None:
+        processes = [*reversed(self.daemons.values()), *([self.status] if self.status else [])]
+        for process in processes:
+            if process.poll() is None:
+                process.send_signal(signal.SIGCONT)
                 process.terminate()
-        for process in (getattr(self, "status", None), self.haptic, self.world):
-            if process is not None:
-                try:
-                    process.wait(timeout=5)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+        for process in processes:
+            try:
+                process.wait(timeout=5)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        for role in ("haptic", "world"):  # of one that was killed and not started again
+            path = f"/dev/shm/rikiseki.{self.instance}.{role}"
+            if os.path.exists(path):
+                os.remove(path)
 
 
 def moving_body(reading):
@@ -112,16 +137,20 @@ class Trials:
         self.start_x = None
         self.generation = None
         self.resetting = False
+        self.first = None
         self.last = None
 
     def watch(self, reading):
         """Returns True when the block should be put back."""
+        if self.first is None:
+            self.first = reading
         self.last = reading
         body = moving_body(reading)
         if body is None:
             return False
-        if body["generation"] != self.generation:
-            self.generation = body["generation"]
+        generation = (reading["world"]["epoch"], body["generation"])
+        if generation != self.generation:
+            self.generation = generation
             self.start_x = body["position_m"][0]
             self.resetting = False
         if self.resetting:
@@ -135,6 +164,14 @@ class Trials:
             self.resetting = True
             return True
         return False
+
+    def rate(self, side):
+        """Ticks per second over the whole run, or since the daemon was started again."""
+        first, last = self.first[side], self.last[side]
+        if first["epoch"] != last["epoch"]:
+            return last["rate"]["measured_hz"] or 0.0
+        elapsed = (self.last["time_ns"] - self.first["time_ns"]) * 1e-9
+        return (last["tick"] - first["tick"]) / elapsed if elapsed > 0 else 0.0
 
     def live_line(self, remaining):
         reading = self.last
@@ -153,6 +190,7 @@ def run(arguments, coupling, seconds, logs, interrupted):
     shown = 0.0
     until = time.monotonic() + seconds
     try:
+        pair.start()
         for reading in pair.readings(until):
             if trials.watch(reading):
                 pair.reset_scene()
@@ -191,11 +229,12 @@ def table(all_trials):
         books, world = trials.last["books"], trials.last["world"]
         exact = books["balanced"] and not any(books["pending"])
         balanced = balanced and exact
-        received = [a * NEWTON_SECONDS + p for a, p in zip(world["applied"], world["penalty_impulse_ns"])]
+        received = [a * NEWTON_SECONDS + p for a, p in zip(books["applied"], world["penalty_impulse_ns"])]
+        declared = [d + lost for d, lost in zip(books["discarded"], books["peer_lost"])]
         deviation = statistics.stdev(stops) if len(stops) > 1 else 0.0
         print(f"{trials.coupling:9s} {len(stops):6d} {statistics.mean(stops):8.1f} {deviation:6.1f} "
               f"{max(stops) - min(stops):7.1f}   {newton_seconds(books['displayed']):10.6f} "
-              f"{sum(r * r for r in received) ** 0.5:10.6f} {newton_seconds(books['discarded']):10.6f}"
+              f"{sum(r * r for r in received) ** 0.5:10.6f} {newton_seconds(declared):10.6f}"
               f"       {'displayed = applied + discarded, exactly' if exact else 'DO NOT BALANCE'}")
     print(f"\n{'loop':9s} {'rate Hz':>8s} {'p50 us':>8s} {'p99 us':>8s} {'p99.9 us':>9s} {'missed':>7s}   scheduling")
     for trials in all_trials:
@@ -205,10 +244,11 @@ def table(all_trials):
             side = trials.last[name]
             late, scheduling = side["lateness_us"], side["scheduling"]
             memory = ", memory locked" if scheduling["memory_locked"] else ""
-            print(f"{name:9s} {side['rate']['measured_hz'] or 0:8.1f} {late['p50']:8.0f} {late['p99']:8.0f} "
+            print(f"{name:9s} {trials.rate(name):8.1f} {late['p50']:8.0f} {late['p99']:8.0f} "
                   f"{late['p99_9']:9.0f} {side['missed']:7d}   {scheduling['policy']}{memory} ({trials.coupling})")
     print("\nstop: where the block came to rest after one push, from its start, over the pushes; spread: largest -"
-          " smallest.\nreceived: momentum that the world gave to the block for the finger. lateness: of the wake-up,"
+          " smallest.\nreceived: momentum that the world gave to the block for the finger. discarded: declared not applied, or lost with a"
+          " world that died.\nlateness: of the wake-up,"
           " against the schedule.")
     return balanced
 
@@ -219,6 +259,7 @@ def main():
         print("scripts/demo: coupling local is not built yet; there are: " + ", ".join(EXISTING), file=sys.stderr)
         return 64
     couplings = EXISTING if arguments.coupling == "compare" else (arguments.coupling,)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # even where a shell has switched it off
     signal.signal(signal.SIGTERM, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt()))
     all_trials, interrupted = [], [False]
     with tempfile.TemporaryDirectory(prefix="rikiseki-demo-") as logs:

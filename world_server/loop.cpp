@@ -67,9 +67,8 @@ double WorldLoop::TimeToAdvance(std::int64_t now_ns, std::int64_t missed) {
   // The world follows the time of the impulses it consumed; alone, it follows its own.
   const std::int64_t nominal_ns = period_ns_ * (1 + missed);
   if (world_clock_ns_ == 0) world_clock_ns_ = now_ns - nominal_ns;
-  const std::int64_t target_ns = peer_state_ == protocol::PeerState::kLive
-                                     ? newest_tick_ns_
-                                     : world_clock_ns_ + nominal_ns;
+  const std::int64_t target_ns =
+      peer_state_ == protocol::PeerState::kLive ? newest_tick_ns_ : world_clock_ns_ + nominal_ns;
   const std::int64_t advance_ns =
       std::clamp<std::int64_t>(target_ns - world_clock_ns_, 0, longest_advance_ns_);
   world_clock_ns_ = std::max(world_clock_ns_, target_ns);

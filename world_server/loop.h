@@ -47,9 +47,9 @@ class WorldLoop {
   protocol::WorldFrame frame_;
   protocol::WorldHealth loop_health_;  // what the step does not know
   protocol::PeerState peer_state_ = protocol::PeerState::kAbsent;
-  std::int64_t newest_tick_ns_ = 0;    // t_j + T: the impulse consumed runs to here
-  std::int64_t world_clock_ns_ = 0;    // the world was advanced to here; 0 = not started
-  std::uint64_t lapped_before_ = 0;    // by peers that are gone
+  std::int64_t newest_tick_ns_ = 0;  // t_j + T: the impulse consumed runs to here
+  std::int64_t world_clock_ns_ = 0;  // the world was advanced to here; 0 = not started
+  std::uint64_t lapped_before_ = 0;  // by peers that are gone
 };
 
 }  // namespace rikiseki::world

@@ -31,7 +31,8 @@ ReadyScene Load(const Settings& settings) {
   ReadyScene ready;
   ready.loaded = LoadSdf(settings.scene.file);
   for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
-  ready.dynamics = std::make_unique<BulletWorld>(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
+  ready.dynamics =
+      std::make_unique<BulletWorld>(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
   return ready;
 }
 
@@ -46,7 +47,8 @@ class SceneReload {
   /// Starts what was requested, and puts what is ready in the place of the running scene. If the file is
   /// refused, the running scene stays.
   void Poll(WorldStep& step) {
-    if (loading_.valid() && loading_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    if (loading_.valid() &&
+        loading_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
       try {
         ReadyScene ready = loading_.get();
         spdlog::info("scene {} loaded anew: {} bodies", ready.loaded.scene.name,
@@ -78,9 +80,13 @@ void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
     const std::int64_t now_ns = MonotonicNow();
     switch (WaitForSignal(0)) {
       case SIGINT:
-      case SIGTERM: return;
-      case SIGHUP: reload.Request(); break;
-      default: break;
+      case SIGTERM:
+        return;
+      case SIGHUP:
+        reload.Request();
+        break;
+      default:
+        break;
     }
     reload.Poll(step);
     loop.Tick(now_ns, schedule.deadline_ns(), missed);
@@ -107,23 +113,21 @@ int Run(int argc, char** argv) {
   }
   BlockSignals();
   const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
-  const auto body_room =
-      std::max(kBodyRoom, static_cast<std::uint32_t>(scene.bodies.size()));
+  const auto body_room = std::max(kBodyRoom, static_cast<std::uint32_t>(scene.bodies.size()));
   protocol::SegmentOwner owner({.instance = options.instance,
                                 .role = protocol::Role::kWorld,
                                 .streams = protocol::WorldStreams(period_ns, body_room, period_ns),
                                 .build = kBuild,
                                 .runtime_directory = ""});
   for (const std::string& note : owner.notes()) spdlog::info("{}", note);
-  protocol::PeerLink link(
-      {.peer = {.instance = options.instance,
-                .role = protocol::Role::kHaptic,
-                .required = {{.type = protocol::StreamType::kHapticTick}},
-                .owners = {}}});
+  protocol::PeerLink link({.peer = {.instance = options.instance,
+                                    .role = protocol::Role::kHaptic,
+                                    .required = {{.type = protocol::StreamType::kHapticTick}},
+                                    .owners = {}}});
   WorldStep step(settings, scene, std::move(ready.dynamics), owner.epoch());
   WorldLoop loop(settings, step, owner, link);
-  spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(), settings.loop.rate_hz,
-               scene.name, scene.bodies.size(), kBuild);
+  spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(),
+               settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
   RunUntilStopped(settings, step, loop, link);
   spdlog::info("stopped");
   return kExitOk;

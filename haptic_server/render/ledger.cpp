@@ -107,7 +107,8 @@ void Ledger::Receive(std::uint64_t world_epoch, const protocol::WorldFrame& fram
   }
 }
 
-void Ledger::FreeChannels() noexcept {
+void Ledger::BeginWorld(std::uint64_t world_epoch) noexcept {
+  if (world_epoch == world_epoch_) return;
   for (Account& account : accounts_) account.used = false;
 }
 

@@ -44,8 +44,10 @@ class Ledger {
   /// forgotten are ignored. Before Book of the same tick. // RT:
   void Receive(std::uint64_t world_epoch, const protocol::WorldFrame& frame) noexcept;
 
-  /// Another world is displayed from now on: frees all channels. // RT:
-  void FreeChannels() noexcept;
+  /// The surfaces of another world are displayed from now on: frees all channels, unless that world
+  /// has acknowledged us already. Then it reads our totals, must see what closes them, and its acks
+  /// free them. // RT:
+  void BeginWorld(std::uint64_t world_epoch) noexcept;
 
   /// Makes sure that a body has an open channel. False if all are taken: its force must not be
   /// displayed. A body whose channel closed but was not freed gets the same one again. // RT:

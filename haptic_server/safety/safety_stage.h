@@ -50,7 +50,7 @@ class SafetyStage {
 
   SafetySettings settings_;
   double period_s_;
-  double largest_step_n_;  // slew limit times nominal period
+  double largest_step_n_;       // slew limit times nominal period
   std::int64_t ticks_to_zero_;  // from the cap, at the slew limit
   std::int64_t fault_after_misses_;
   std::int64_t missed_in_a_row_ = 0;

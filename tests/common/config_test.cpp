@@ -186,7 +186,7 @@ TEST_CASE("a path is relative to the file that gives it; with --set, to the work
   CHECK(bowl.picture == "/c.png");
 }
 
-TEST_CASE("--set wins over the file, and the last one wins") {
+TEST_CASE("an override wins over the file, and the last one wins") {
   const TemporaryFile file("[bowl]\ncount = 2\n");
   Bowl bowl;
   ConfigSchema schema = SchemaOf(bowl);

@@ -6,22 +6,34 @@
 #include <cstdlib>
 #include <new>
 
-namespace rikiseki::test {
+namespace {
 
 thread_local constinit long allocations = 0;
 thread_local constinit long locks = 0;
+
+}  // namespace
+
+namespace rikiseki::test {
+
+// Functions, because the compiler knows malloc and believes that it touches no variable.
+long Allocations() {
+  return allocations;
+}
+long Locks() {
+  return locks;
+}
 
 }  // namespace rikiseki::test
 
 extern "C" void* __libc_malloc(std::size_t size);  // NOLINT: glibc's own name
 
 extern "C" void* malloc(std::size_t size) {
-  ++rikiseki::test::allocations;
+  ++allocations;
   return __libc_malloc(size);
 }
 
 extern "C" int pthread_mutex_lock(pthread_mutex_t* mutex) {
-  ++rikiseki::test::locks;
+  ++locks;
   using Lock = int (*)(pthread_mutex_t*);
   static const auto real = reinterpret_cast<Lock>(dlsym(RTLD_NEXT, "pthread_mutex_lock"));
   return real(mutex);

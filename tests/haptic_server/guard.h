@@ -4,7 +4,8 @@
 
 namespace rikiseki::test {
 
-extern thread_local long allocations;  // of this thread, since it began
-extern thread_local long locks;
+/// Of this thread, since it began.
+long Allocations();
+long Locks();
 
 }  // namespace rikiseki::test

@@ -87,11 +87,11 @@ TEST_CASE("a tick of the loop over shared memory allocates nothing and locks not
     for (int k = 0; k < 1500; ++k) {
       now_ns += kPeriodNs;
       if (k % 20 == 0) world->Publish(owner.epoch(), step.health().ticks);
-      const long allocations_before = test::allocations;
-      const long locks_before = test::locks;
+      const long allocations_before = test::Allocations();
+      const long locks_before = test::Locks();
       loop.Tick(now_ns, now_ns - 40'000, 0);
-      allocated += test::allocations - allocations_before;
-      locked += test::locks - locks_before;
+      allocated += test::Allocations() - allocations_before;
+      locked += test::Locks() - locks_before;
       touched = touched || loop.reason() == protocol::ForceReason::kContact;
     }
     world.reset();

@@ -10,26 +10,26 @@
 namespace rikiseki::haptic {
 namespace {
 
-using test::allocations;
-using test::locks;
+using test::Allocations;
+using test::Locks;
 
 void* volatile sink = nullptr;  // keeps the compiler from leaving an allocation out
 
 TEST_CASE("the guard notices new, malloc and a mutex") {
-  long before = allocations;
+  long before = Allocations();
   sink = new int(1);
-  REQUIRE(allocations > before);
+  REQUIRE(Allocations() > before);
   delete static_cast<int*>(sink);
-  before = allocations;
+  before = Allocations();
   sink = std::malloc(8);
-  const long after = allocations;
+  const long after = Allocations();
   std::free(sink);
   REQUIRE(after == before + 1);
-  const long locks_before = locks;
+  const long locks_before = Locks();
   std::mutex mutex;
   mutex.lock();
   mutex.unlock();
-  const long locks_after = locks;
+  const long locks_after = Locks();
   REQUIRE(locks_after == locks_before + 1);
 }
 
@@ -65,16 +65,16 @@ TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") 
       frame.acked_tick = static_cast<std::uint64_t>(k > 10 ? k - 10 : 0);
       world.frame = &frame;
     }
-    const long allocations_before = allocations;
-    const long locks_before = locks;
+    const long allocations_before = Allocations();
+    const long locks_before = Locks();
     step.Tick(time, world, message);
-    allocated += allocations - allocations_before;
-    locked += locks - locks_before;
+    allocated += Allocations() - allocations_before;
+    locked += Locks() - locks_before;
     touched = touched || message.pointers[0].reason == protocol::ForceReason::kContact;
   }
-  const long allocations_before = allocations;
+  const long allocations_before = Allocations();
   step.Stop(static_cast<std::int64_t>(message.start_ns) + 1'000'000, message);
-  allocated += allocations - allocations_before;
+  allocated += Allocations() - allocations_before;
   REQUIRE(touched);
   REQUIRE(allocated == 0);
   REQUIRE(locked == 0);

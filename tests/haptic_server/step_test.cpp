@@ -398,25 +398,29 @@ TEST_CASE(
     Vec3 true_impulse = Vec3::Zero();
     double time_s = 0;
     protocol::HapticTick published;  // the newest that the world can see
+    protocol::WorldFrame made;       // its newest frame, which arrives in tick `due`
+    int due = -1;
     bool alive = true;
     std::map<std::uint64_t, int> worlds_pushed;
     for (int k = 0; k < 40'000; ++k) {
       const protocol::WorldFrame* frame = nullptr;
       if (k > 0 && alive && k % 25 == 0) {
-        protocol::WorldFrame& next = bench.NextFrame();
-        next.period_ns = 25'000'000;
-        if (world_frames++ > 0) world->Read(published, chance(20), next);
-        if (!chance(30)) frame = &next;  // else overwritten by the next before it was looked at
+        made = bench.NextFrame();
+        made.period_ns = 25'000'000;
+        if (world_frames++ > 0) world->Read(published, chance(20), made);
+        // Some frames are overwritten by the next before they are looked at.
+        due = chance(30) ? -1 : k + static_cast<int>(random() % 20);
       }
+      if (alive && k == due) frame = &made;
       if (frame != nullptr && frame->acked_epoch != 0) {
         acked = static_cast<std::int64_t>(frame->acked_tick);
         world_applied = frame->applied;
         world_discarded = frame->discarded;
       }
-      if (alive && chance(100) && random() % 3000 == 0) {  // dies
+      if (alive && random() % 3000 == 0) {  // dies
         alive = false;
-        bench.world.ready = chance(50);
-      } else if (!alive && random() % 400 == 0) {  // restarts
+        bench.world.ready = random() % 2 == 0;
+      } else if (!alive && random() % 200 == 0) {  // restarts, often before its force has faded
         alive = true;
         applied = Plus(applied, world_applied);
         discarded = Plus(discarded, world_discarded);

@@ -85,7 +85,9 @@ std::string Child::Stderr() const {
   return text.str();
 }
 
-std::string Program(const std::string& name) { return std::string(RIKISEKI_BIN_DIR) + "/" + name; }
+std::string Program(const std::string& name) {
+  return std::string(RIKISEKI_BIN_DIR) + "/" + name;
+}
 
 std::string SourceFile(const std::string& path) {
   return std::string(RIKISEKI_SOURCE_DIR) + "/" + path;

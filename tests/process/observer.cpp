@@ -24,7 +24,8 @@ protocol::ImpulseUnits Growth(const protocol::HapticTick& now, const protocol::H
         earlier = other.impulse;
       }
     }
-    for (std::size_t axis = 0; axis < 3; ++axis) growth[axis] += channel.impulse[axis] - earlier[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      growth[axis] += channel.impulse[axis] - earlier[axis];
   }
   return growth;
 }
@@ -53,7 +54,8 @@ std::unique_ptr<protocol::PeerView> Observe(const std::string& instance, protoco
   protocol::AttachResult result;
   const bool attached = Eventually(
       [&] {
-        result = protocol::Attach({.instance = instance, .role = role, .required = {}, .owners = {}});
+        result =
+            protocol::Attach({.instance = instance, .role = role, .required = {}, .owners = {}});
         return result.status == protocol::AttachStatus::kAttached;
       },
       seconds);

@@ -46,8 +46,8 @@ class TickWatch {
   std::vector<WatchedTick> All() const;
   std::uint64_t lost() const { return lost_; }
   bool finite() const { return finite_; }
-  double worst_over_cap() const { return worst_over_cap_; }        // N above the cap, <= 0 is good
-  double worst_over_slew() const { return worst_over_slew_; }      // N above the step allowed per tick
+  double worst_over_cap() const { return worst_over_cap_; }    // N above the cap, <= 0 is good
+  double worst_over_slew() const { return worst_over_slew_; }  // N above the step allowed per tick
 
  private:
   void Run();

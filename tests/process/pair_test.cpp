@@ -25,17 +25,29 @@ constexpr double kZeroForce = 1e-12;  // N
 constexpr double kUnit = protocol::kImpulseUnit;
 
 std::vector<std::string> HapticCommand(const std::string& instance) {
-  return {Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"),
-          "--instance", instance, "--set", "safety.slew_limit_n_per_s=5000"};
+  return {Program("haptic_server"),
+          "--config",
+          SourceFile("config/haptic_server.ini"),
+          "--instance",
+          instance,
+          "--set",
+          "safety.slew_limit_n_per_s=5000"};
 }
 
 std::vector<std::string> WorldCommand(const std::string& instance,
                                       const std::string& coupling = "impulse") {
-  return {Program("world_server"), "--config", SourceFile("config/world_server.ini"),
-          "--instance", instance, "--set", "coupling.coupling=" + coupling};
+  return {Program("world_server"),
+          "--config",
+          SourceFile("config/world_server.ini"),
+          "--instance",
+          instance,
+          "--set",
+          "coupling.coupling=" + coupling};
 }
 
-double Norm(const protocol::Vector& v) { return std::hypot(v[0], v[1], v[2]); }
+double Norm(const protocol::Vector& v) {
+  return std::hypot(v[0], v[1], v[2]);
+}
 
 double Norm(const protocol::ImpulseUnits& units) {
   return kUnit * std::hypot(static_cast<double>(units[0]), static_cast<double>(units[1]),
@@ -77,7 +89,8 @@ std::optional<std::uint64_t> TimeToZero(const std::vector<WatchedTick>& ticks,
   std::optional<std::uint64_t> silent_since;
   for (const WatchedTick& tick : ticks) {
     if (tick.world_frame == last_frame && !silent_since) silent_since = tick.start_ns;
-    if (tick.world_frame != last_frame && silent_since && tick.world_frame != 0) return std::nullopt;
+    if (tick.world_frame != last_frame && silent_since && tick.world_frame != 0)
+      return std::nullopt;
     if (silent_since && tick.force < kZeroForce && tick.reason != ForceReason::kNoContact) {
       return tick.start_ns - *silent_since;
     }
@@ -140,7 +153,8 @@ TEST_CASE("position discards every impulse, and says so") {
   CheckSafe(watch);
 }
 
-TEST_CASE("a world killed in contact: the force goes to zero in the stated time, and couples again") {
+TEST_CASE(
+    "a world killed in contact: the force goes to zero in the stated time, and couples again") {
   const Instance instance;
   Child haptic(HapticCommand(instance));
   Child world(WorldCommand(instance));
@@ -153,7 +167,8 @@ TEST_CASE("a world killed in contact: the force goes to zero in the stated time,
   std::this_thread::sleep_for(std::chrono::nanoseconds(bound_ns));
   std::this_thread::sleep_for(std::chrono::milliseconds(200));
   std::uint64_t frame_at_kill = 0;
-  for (const WatchedTick& tick : watch.All()) frame_at_kill = std::max(frame_at_kill, tick.world_frame);
+  for (const WatchedTick& tick : watch.All())
+    frame_at_kill = std::max(frame_at_kill, tick.world_frame);
   const auto to_zero_ns = TimeToZero(watch.All(), frame_at_kill);
   REQUIRE(to_zero_ns);
   CHECK(*to_zero_ns <= bound_ns);
@@ -168,11 +183,14 @@ TEST_CASE("a world killed in contact: the force goes to zero in the stated time,
   CheckNotKicked(*world_view);
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
   CheckBooks(*haptic_view);
-  CHECK(Norm(ReadHapticHealth(*haptic_view).books.peer_lost) > 0);  // nobody took it, and it is said
+  CHECK(Norm(ReadHapticHealth(*haptic_view).books.peer_lost) >
+        0);  // nobody took it, and it is said
   CheckSafe(watch);
 }
 
-TEST_CASE("a haptic side killed in contact: the world goes on, applies what was published, couples again") {
+TEST_CASE(
+    "a haptic side killed in contact: the world goes on, applies what was published, couples "
+    "again") {
   const Instance instance;
   Child world(WorldCommand(instance));
   const auto world_view = Observe(instance, Role::kWorld);
@@ -211,7 +229,8 @@ TEST_CASE("a haptic side killed in contact: the world goes on, applies what was 
   CheckSafe(watch);
 }
 
-TEST_CASE("a world that sleeps in contact: zero force meanwhile, no kick and no step when it wakes") {
+TEST_CASE(
+    "a world that sleeps in contact: zero force meanwhile, no kick and no step when it wakes") {
   const Instance instance;
   Child haptic(HapticCommand(instance));
   Child world(WorldCommand(instance));
@@ -222,7 +241,8 @@ TEST_CASE("a world that sleeps in contact: zero force meanwhile, no kick and no 
   world.Signal(SIGSTOP);
   std::this_thread::sleep_for(std::chrono::milliseconds(1500));
   std::uint64_t frame_at_stop = 0;
-  for (const WatchedTick& tick : watch.All()) frame_at_stop = std::max(frame_at_stop, tick.world_frame);
+  for (const WatchedTick& tick : watch.All())
+    frame_at_stop = std::max(frame_at_stop, tick.world_frame);
   const std::uint64_t bound_ns = ReadHapticHealth(*haptic_view).zero_force_after_ns;
   const auto to_zero_ns = TimeToZero(watch.All(), frame_at_stop);
   REQUIRE(to_zero_ns);
@@ -231,8 +251,8 @@ TEST_CASE("a world that sleeps in contact: zero force meanwhile, no kick and no 
   const double momentum_before = Norm(ReadWorldHealth(*world_view).applied);
 
   world.Signal(SIGCONT);
-  REQUIRE(Eventually(
-      [&] { return ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive; }));
+  REQUIRE(
+      Eventually([&] { return ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive; }));
   // SPEC.md 7: after a gap no more than force_cap * G is applied; 20 N * 150 ms with the shipped file.
   CHECK(Norm(ReadWorldHealth(*world_view).applied) <= momentum_before + 20 * 0.15 + 0.5);
   CheckNotKicked(*world_view);

@@ -51,8 +51,8 @@ Refusal RunHaptic(const TemporaryFile& file) {
 
 TEST_CASE("an unknown key") {
   const TemporaryFile file("bad.ini", "[render]\n# a comment\nstifness_n_per_m = 2000\n");
-  CheckOneLine(RunHaptic(file), {file.path() + ":3", "render.stifness_n_per_m", "2000",
-                                 "render.stiffness_n_per_m"});
+  CheckOneLine(RunHaptic(file),
+               {file.path() + ":3", "render.stifness_n_per_m", "2000", "render.stiffness_n_per_m"});
 }
 
 TEST_CASE("a wrong value") {
@@ -87,7 +87,8 @@ TEST_CASE("a missing scene") {
 }
 
 TEST_CASE("a broken SDF") {
-  const TemporaryFile file("bad.sdf", "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n");
+  const TemporaryFile file("bad.sdf",
+                           "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n");
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", file.path()}),
                {file.path()});
@@ -98,11 +99,12 @@ TEST_CASE("an SDF that names no world, and one with a shape of nonsense size") {
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", empty.path()}),
                {empty.path(), "world"});
-  const TemporaryFile negative("bad.sdf",
-                               "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n"
-                               "<model name='m'><link name='l'><collision name='c'><geometry><box>\n"
-                               "<size>-1 1 1</size></box></geometry></collision></link></model>\n"
-                               "</world></sdf>\n");
+  const TemporaryFile negative(
+      "bad.sdf",
+      "<?xml version='1.0'?>\n<sdf version='1.9'>\n<world name='w'>\n"
+      "<model name='m'><link name='l'><collision name='c'><geometry><box>\n"
+      "<size>-1 1 1</size></box></geometry></collision></link></model>\n"
+      "</world></sdf>\n");
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
                     "--scene", negative.path()}),
                {negative.path() + ":4", "box", "above 0"});

@@ -17,7 +17,7 @@ struct Kick {
 };
 
 struct BodyState {
-  Pose pose = {};  // of the centre-of-mass frame, in W
+  Pose pose = {};                        // of the centre-of-mass frame, in W
   Vec3 velocity = Vec3::Zero();          // m/s, of the centre of mass
   Vec3 angular_velocity = Vec3::Zero();  // rad/s
 };

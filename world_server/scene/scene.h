@@ -10,29 +10,41 @@
 
 namespace rikiseki::world {
 
-struct Box { Vec3 half_extents = Vec3::Zero(); };              // m
-struct Sphere { double radius = 0; };                          // m
-struct HalfSpace { Vec3 normal = Vec3::UnitZ(); };             // unit, out of the solid; through its origin
-struct Cylinder { double radius = 0, half_length = 0; };       // m, axis z
-struct Capsule { double radius = 0, half_length = 0; };        // m, axis z, without the caps
-struct Ellipsoid { Vec3 radii = Vec3::Zero(); };               // m
+struct Box {
+  Vec3 half_extents = Vec3::Zero();
+};  // m
+struct Sphere {
+  double radius = 0;
+};  // m
+struct HalfSpace {
+  Vec3 normal = Vec3::UnitZ();
+};  // unit, out of the solid; through its origin
+struct Cylinder {
+  double radius = 0, half_length = 0;
+};  // m, axis z
+struct Capsule {
+  double radius = 0, half_length = 0;
+};  // m, axis z, without the caps
+struct Ellipsoid {
+  Vec3 radii = Vec3::Zero();
+};  // m
 using Shape = std::variant<Box, Sphere, HalfSpace, Cylinder, Capsule, Ellipsoid>;
 
 /// One collision shape of a body.
 struct Collider {
   Shape shape;
-  Pose pose_BS = {};       // shape in the body's centre-of-mass frame
-  double friction = 1;     // Coulomb; two surfaces combine as sqrt(mu1 mu2)
+  Pose pose_BS = {};                             // shape in the body's centre-of-mass frame
+  double friction = 1;                           // Coulomb; two surfaces combine as sqrt(mu1 mu2)
   std::optional<double> stiffness_n_per_m = {};  // rendered, where the scene says so
   std::optional<double> damping_ns_per_m = {};
 };
 
 struct SceneBody {
-  std::string name;        // "model::link"
+  std::string name;  // "model::link"
   bool fixed = false;
-  double mass_kg = 0;      // > 0 unless fixed
+  double mass_kg = 0;           // > 0 unless fixed
   Mat3 inertia = Mat3::Zero();  // kg m^2, about the centre of mass, in the body frame
-  Pose pose_WB = {};       // of the centre-of-mass frame at the start
+  Pose pose_WB = {};            // of the centre-of-mass frame at the start
   std::vector<Collider> colliders = {};
 };
 

@@ -1,21 +1,52 @@
 #include "haptic_server/device/hand.h"
 
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <unsupported/Eigen/MatrixFunctions>
 
 namespace rikiseki::haptic {
 namespace {
 
-// The same step from the exponential of the augmented matrix d/dt (y, v, F).
+using Matrix = std::array<std::array<long double, 3>, 3>;
+
+Matrix Times(const Matrix& a, const Matrix& b) {
+  Matrix product{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      for (std::size_t k = 0; k < 3; ++k) product[i][j] += a[i][k] * b[k][j];
+    }
+  }
+  return product;
+}
+
+// The same step from the exponential of the matrix of d/dt (y, v, F): its power series over a small
+// fraction of the time, squared up.
 ImpedanceStep ByMatrixExponential(const Impedance& impedance, double dt_s) {
-  Eigen::Matrix<long double, 3, 3> a = Eigen::Matrix<long double, 3, 3>::Zero();
-  a(0, 1) = 1;
-  a(1, 0) = -static_cast<long double>(impedance.stiffness_n_per_m) / impedance.mass_kg;
-  a(1, 1) = -static_cast<long double>(impedance.damping_ns_per_m) / impedance.mass_kg;
-  a(1, 2) = 1.0L / impedance.mass_kg;
-  const Eigen::Matrix<long double, 3, 3> e = (a * static_cast<long double>(dt_s)).exp();
-  const auto at = [&](int i, int j) { return static_cast<double>(e(i, j)); };
+  constexpr int kSquarings = 16;
+  const long double dt = std::ldexp(static_cast<long double>(dt_s), -kSquarings);
+  const long double m = impedance.mass_kg;
+  const Matrix a = {
+      {{0, dt, 0},
+       {-impedance.stiffness_n_per_m / m * dt, -impedance.damping_ns_per_m / m * dt, dt / m},
+       {0, 0, 0}}};
+  // Without the identity, which would drown it: exp(2 a) - 1 = 2 e + e e, with e = exp(a) - 1.
+  Matrix term = a;
+  Matrix e = a;
+  for (int order = 2; order < 20; ++order) {
+    term = Times(term, a);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) e[i][j] += term[i][j] /= order;
+    }
+  }
+  for (int squaring = 0; squaring < kSquarings; ++squaring) {
+    const Matrix square = Times(e, e);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t j = 0; j < 3; ++j) e[i][j] = 2 * e[i][j] + square[i][j];
+    }
+  }
+  const auto at = [&](std::size_t i, std::size_t j) {
+    return static_cast<double>(e[i][j] + (i == j ? 1 : 0));
+  };
   return {at(0, 0), at(0, 1), at(0, 2), at(1, 0), at(1, 1), at(1, 2)};
 }
 

@@ -281,9 +281,23 @@ TEST_CASE("a channel is reused only after the world has seen it closed") {
   REQUIRE(message.channels[0].impulse == total);
   REQUIRE(message.channels[0].opened_tick == 0);
   REQUIRE(ledger.Open(99, 0, 0, 2));
-  ledger.FreeChannels();
-  ledger.Write(message);
-  REQUIRE(message.channel_count == 0);
+  SECTION("a world that has not looked yet starts with all of them") {
+    ledger.BeginWorld(6);
+    ledger.Write(message);
+    REQUIRE(message.channel_count == 0);
+  }
+  SECTION("a world that reads already must see them closed first") {
+    book(false);
+    ledger.Receive(6, Ack(3, 2, 2, {}));
+    ledger.BeginWorld(6);
+    ledger.CloseIdle(0, 3, nobody_near);
+    book(false);
+    ledger.Write(message);
+    REQUIRE(message.channel_count == 2);
+    ledger.Receive(6, Ack(3, 3, 2, {}));
+    ledger.Write(message);
+    REQUIRE(message.channel_count == 0);
+  }
 }
 
 TEST_CASE("damaged forces and hostile acks overflow nothing") {
