@@ -1183,9 +1183,13 @@ def run_world(arguments):
         (f"a block of {world.mass:g} kg" if world.mass else "a fixed box") + f", epoch {own.epoch}")
 
     def drain():
-        """Every tick that was published and not read yet."""
+        """Every tick that was published and not read yet, within half a period: whoever floods is lapped, which
+        loses nothing (7.4-1). Whether nothing is left."""
         nonlocal tick, tick_ns, fresh_ticks
+        end_ns = now_ns() + period_ns // 2
         while reader is not None and not reader.hopeless():
+            if now_ns() > end_ns:
+                return False
             status = reader.next()
             if status == FRESH:
                 if ledger.epoch != reader.view.epoch:
@@ -1196,11 +1200,14 @@ def run_world(arguments):
                 break
         if reader is not None and reader.hopeless() and not reader.view.gone:
             link.refuse(reader.view, reader.why or "its counter runs backwards")
+        return True
 
+    offered = None
     while not stop:
         now = schedule.wait()
-        offered = link.take()  # first: whose old segment is frozen, is then read to its end (5.3-5)
-        drain()
+        if offered is None:
+            offered = link.take()  # first: the old segment, frozen then, is read to its end (5.3-5)
+        drained = drain()
         impulses = ledger.take()
         world.step(impulses, dt)
         if scenes.published <= world.resets:
@@ -1233,10 +1240,11 @@ def run_world(arguments):
                 peer_epoch=reader.view.epoch if reader else 0, applied=ledger.life_applied,
                 moving_bodies=int(world.mass > 0), resets=world.resets,
                 scene=b"peer.py block" if world.mass else b"peer.py box", **discarded, **schedule.health()))
-        if offered is not None:  # only now: the old segment's end is acknowledged
+        if offered is not None and drained:  # only now: the old segment's end is acknowledged
             if reader is not None:
                 reader.view.close()
             totals, reader, tick, fresh_ticks = counts, Reader(offered, HAPTIC_TICK), None, 0
+            offered = None
         schedule.duration.note(now_ns() - now)
     own.close()
     link.stop()
@@ -1432,13 +1440,18 @@ class PeerWatch:
     LONGEST_PERIOD_NS = 200_000_000
 
     def __init__(self):
+        self.stated_period_ns = self.LONGEST_PERIOD_NS  # of the newest frame of any world
         self.forget()
 
     def forget(self):
         self.state, self.fresh, self.frame_ns, self.period_ns = ABSENT, 0, 0, self.LONGEST_PERIOD_NS
 
     def lost_after(self):
-        return max(5 * self.period_ns, 250_000_000)
+        return self.lost_after_period(self.period_ns)
+
+    @staticmethod
+    def lost_after_period(period_ns):
+        return max(5 * period_ns, 250_000_000)
 
     def update(self, now, view, frame, force_is_zero):
         alive = view is not None and view.ready() and now - view.heartbeat_ns() <= self.lost_after()
@@ -1462,7 +1475,7 @@ class PeerWatch:
                 self.fresh = 0
         if frame is not None and self.state != ABSENT:
             self.frame_ns = now
-            self.period_ns = min(frame["period_ns"], self.LONGEST_PERIOD_NS)
+            self.period_ns = self.stated_period_ns = min(frame["period_ns"], self.LONGEST_PERIOD_NS)
             self.fresh += 1
             if self.state == WAITING and self.fresh >= 3:  # 5.5-3
                 self.state = LIVE
@@ -1551,6 +1564,7 @@ class HapticSide:
         self.finger, self.surfaces, self.watch = Finger(target), Surfaces(), PeerWatch()
         self.ledger, self.safety = Ledger(own.epoch, self.period), Safety(self.period)
         self.reader = None
+        self.newest_frame = 0  # number of the newest frame of this reader
         self.shown_epoch = self.shown_frame = self.channel_epoch = 0
         self.start_ns, self.tick, self.reason, self.reason_ticks = 0, 0, WORLD_ABSENT, 0
         self.largest_force = self.largest_step = 0.0
@@ -1565,14 +1579,15 @@ class HapticSide:
                 self.retries += self.reader.retries
                 self.rejected += self.reader.rejected
                 self.reader.view.close()
-            self.reader = Reader(offered, WORLD_FRAME)
+            self.reader, self.newest_frame = Reader(offered, WORLD_FRAME), 0
         if self.reader is None:
             return None
         status = self.reader.latest()
         if self.reader.hopeless() and not self.reader.view.gone:
             link.refuse(self.reader.view, self.reader.why or "its counter runs backwards")
-        if status != FRESH:
+        if status != FRESH or self.reader.value["frame"] <= self.newest_frame:  # 6.2-3
             return None
+        self.newest_frame = self.reader.value["frame"]
         self.ledger.receive(self.reader.view.epoch, self.reader.value)
         return self.reader.value
 
@@ -1642,8 +1657,8 @@ class HapticSide:
             reason=self.reason, peer_state=state,
             peer_epoch=self.reader.view.epoch if self.reader and watch.state != ABSENT else 0,
             feature_age_ns=max(0, now - watch.frame_ns) if self.shown_epoch else 0,
-            zero_force_after_ns=watch.lost_after() + round((FADE + CAP / SLEW_LIMIT) * 1e9) +
-            3 * self.period_ns, largest_force=self.largest_force, largest_force_step=self.largest_step,
+            zero_force_after_ns=watch.lost_after_period(watch.stated_period_ns) +
+            round((FADE + CAP / SLEW_LIMIT) * 1e9) + 3 * self.period_ns, largest_force=self.largest_force, largest_force_step=self.largest_step,
             slew_limit=SLEW_LIMIT, target=self.finger.wanted(), device=b"peer.py",
             **{f"books.{name}": units for name, units in self.ledger.books.items()}, **schedule.health()))
 
