@@ -6,7 +6,7 @@
  *
  * A peer in short (a whole one is tests/protocol/rikiseki_h_world.c):
  *
- *   own side   rk_create, rk_writer_of;  each tick: rk_encode_*, rk_publish, rk_heartbeat; rk_close
+ *   own side   rk_create, rk_writer_of;  each tick: rk_encode_*, rk_publish, rk_heartbeat, rk_report; rk_close
  *   other side rk_attach (every 100 ms while detached, not in a thread with deadlines),
  *              rk_reader_of;  each tick: rk_state, rk_read_latest or rk_read_next, rk_decode_*;
  *              every 100 ms: rk_owner_alive, rk_replaced;  rk_detach
@@ -1319,6 +1319,7 @@ typedef struct rk_segment {
   int role_lock;
   dev_t device;
   ino_t inode;
+  uint64_t lapped, retries, rejected; /* by the readers of rk_report_last */
   char path[RK_PATH_BYTES];
   char why[RK_WHY_BYTES]; /* what rk_create did not like */
 } rk_segment;
@@ -1524,6 +1525,20 @@ static inline int rk_writer_of(const rk_segment *own, uint32_t type_id, rk_write
 static inline void rk_heartbeat(rk_segment *own, uint64_t tick, uint64_t now_ns) {
   __atomic_store_n(&own->header->tick, tick, __ATOMIC_RELAXED);
   __atomic_store_n(&own->header->heartbeat_ns, now_ns, __ATOMIC_RELAXED);
+}
+
+/* Publishes what a reader of the peer met, on top of those before it. The counters never decrease, so
+ * give it to rk_report_last before it goes. */
+static inline void rk_report(rk_segment *own, const rk_reader *r) {
+  __atomic_store_n(&own->header->lapped, own->lapped + r->lost, __ATOMIC_RELAXED);
+  __atomic_store_n(&own->header->read_retries, own->retries + r->retries, __ATOMIC_RELAXED);
+  __atomic_store_n(&own->header->rejected, own->rejected + r->rejected, __ATOMIC_RELAXED);
+}
+static inline void rk_report_last(rk_segment *own, const rk_reader *r) {
+  rk_report(own, r);
+  own->lapped += r->lost;
+  own->retries += r->retries;
+  own->rejected += r->rejected;
 }
 
 #endif /* RIKISEKI_H */

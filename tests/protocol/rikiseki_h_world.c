@@ -20,15 +20,16 @@ static int same_channel(const rk_channel *a, const rk_channel *b) {
          a->opened_tick == b->opened_tick;
 }
 
-/* 7.4: takes differences of totals. Nothing here can move, so all of it is discarded, and declared. */
-static void consume(rk_frame *frame, const rk_tick *tick, const rk_tick *before, uint64_t epoch) {
-  if (frame->head.acked_epoch == epoch && tick->head.tick <= before->head.tick) return;
+/* 7.4: takes differences of totals. Nothing here can move, so all of it is discarded, and declared. 0 if the
+ * tick is an old one. */
+static int consume(rk_frame *frame, const rk_tick *tick, const rk_tick *before, uint64_t epoch) {
+  if (frame->head.acked_epoch == epoch && tick->head.tick <= before->head.tick) return 0;
   if (frame->head.acked_epoch != epoch) { /* a new haptic side: a baseline, nothing more */
     memset(frame->head.applied, 0, sizeof frame->head.applied);
     memset(frame->head.discarded, 0, sizeof frame->head.discarded);
     frame->head.acked_epoch = epoch;
     frame->head.acked_tick = frame->head.baseline_tick = tick->head.tick;
-    return;
+    return 1;
   }
   for (uint32_t i = 0; i < tick->head.channel_count; ++i) {
     const rk_channel *now = &tick->channel[i];
@@ -45,6 +46,7 @@ static void consume(rk_frame *frame, const rk_tick *tick, const rk_tick *before,
     }
   }
   frame->head.acked_tick = tick->head.tick;
+  return 1;
 }
 
 /* The tangent plane at the box's nearest point, for each finger in reach. */
@@ -108,8 +110,8 @@ static int drain(peer *haptic, rk_frame *frame) {
     if (read != RK_FRESH && read != RK_REJECTED) return 1;
     if (read == RK_FRESH &&
         rk_accept(&haptic->reader, &received, rk_decode_tick(words, sizeof words, &received, &tick),
-                  rk_now_ns()) == RK_SOUND) {
-      consume(frame, &tick, &haptic->tick, haptic->view.header.epoch);
+                  rk_now_ns()) == RK_SOUND &&
+        consume(frame, &tick, &haptic->tick, haptic->view.header.epoch)) {
       haptic->tick = tick;
     }
   }
@@ -150,7 +152,9 @@ int main(int argc, char **argv) {
     find_planes(&frame, &haptic.tick);
     if (rk_encode_frame(&frame, words, &shape)) rk_publish(&writer, words, &shape, rk_now_ns());
     rk_heartbeat(&own, frame.head.frame, rk_now_ns());
+    if (haptic.attached) rk_report(&own, &haptic.reader);
     if (over) {
+      rk_report_last(&own, &haptic.reader);
       rk_detach(&haptic.view);
       haptic.attached = 0;
     }
