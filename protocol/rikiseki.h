@@ -54,8 +54,8 @@
  * Constants */
 
 #define RK_VERSION_MAJOR 0
-#define RK_VERSION_MINOR 1
-#define RK_LAYOUT_HASH UINT64_C(0x7F44583709F045DA) /* 8.3 */
+#define RK_VERSION_MINOR 2
+#define RK_LAYOUT_HASH UINT64_C(0xE6EFB47136B26316) /* 8.3 */
 
 #define RK_MAGIC UINT64_C(0x494B4553494B4952) /* "RIKISEKI" */
 #define RK_BYTE_ORDER UINT32_C(0x01020304)
@@ -69,6 +69,8 @@
 #define RK_MAX_POINTERS 4u
 #define RK_MAX_CHANNELS 16u
 #define RK_MAX_PLANES 32u
+#define RK_MAX_LOCAL_BODIES 4u
+#define RK_MAX_CONTACT_PLANES 16u /* of one local body */
 #define RK_MAX_BODIES 10000u
 #define RK_IMPULSE_UNIT 1e-12 /* N s, N m s: 7.1 */
 
@@ -85,11 +87,12 @@ enum rk_stream_type {
   RK_HAPTIC_HEALTH = 2,
   RK_WORLD_FRAME = 16,
   RK_WORLD_HEALTH = 17,
-  RK_WORLD_BODIES = 18
+  RK_WORLD_BODIES = 18,
+  RK_WORLD_SCENE = 19
 };
 enum rk_channel_state { RK_CHANNEL_OPEN = 1, RK_CHANNEL_CLOSED = 2 };
 enum rk_coupling { RK_BY_POSITION = 1, RK_BY_IMPULSE = 2, RK_BY_LOCAL = 3 };
-enum rk_reason { /* 6.5 */
+enum rk_reason { /* 6.6 */
   RK_NO_CONTACT = 0,
   RK_CONTACT = 1,
   RK_CAPPED = 2,
@@ -111,6 +114,12 @@ enum rk_reason { /* 6.5 */
 #define RK_TICK_ROTATIONS 1u
 #define RK_TICK_GROUND 2u
 #define RK_FRAME_SURFACES 1u
+#define RK_FRAME_VELOCITIES 2u
+#define RK_FRAME_FRICTION 4u
+#define RK_FRAME_RECOVERY 8u
+#define RK_FRAME_LOCAL_BODIES 16u
+#define RK_HEALTH_RECONCILIATION 1u
+#define RK_SCENE_MESHES 1u
 
 /* ---------------------------------------------------------------------------------------------
  * The bytes: records as sections 3, 4 and 6 give them */
@@ -240,6 +249,52 @@ typedef struct rk_plane_surface { /* world.frame/plane_surface */
   double damping;
 } rk_plane_surface;
 
+typedef struct rk_plane_velocity { /* world.frame/plane_velocity */
+  double velocity[3];
+} rk_plane_velocity;
+
+typedef struct rk_plane_friction { /* world.frame/plane_friction */
+  double static_friction;
+  double dynamic_friction;
+} rk_plane_friction;
+
+typedef struct rk_plane_recovery { /* world.frame/plane_recovery */
+  double recovery_s;
+} rk_plane_recovery;
+
+typedef struct rk_local_head { /* world.frame/local */
+  uint32_t local_body_count;
+  uint32_t reserved;
+  uint64_t substep_ns;
+} rk_local_head;
+
+typedef struct rk_local_body { /* world.frame/local_body */
+  uint32_t body;
+  uint32_t generation;
+  uint32_t contact_count;
+  uint32_t reserved;
+  double mass;
+  double inertia[6];
+  double position[3];
+  double orientation[4];
+  double velocity[3];
+  double angular_velocity[3];
+  double acceleration[3];
+  double angular_acceleration[3];
+} rk_local_body;
+
+typedef struct rk_contact_plane { /* world.frame/contact_plane */
+  uint32_t other_body;
+  uint32_t other_generation;
+  double point[3];
+  double normal[3];
+  double gap;
+  double friction;
+  double other_velocity[3];
+  double other_inverse_mass;
+  double impulse[3];
+} rk_contact_plane;
+
 typedef struct rk_scheduling {
   uint32_t policy;
   uint32_t priority;
@@ -279,6 +334,12 @@ typedef struct rk_haptic_health { /* 6.3 */
   uint64_t lateness[256];
   uint64_t duration[256];
 } rk_haptic_health;
+
+typedef struct rk_reconciliation { /* haptic.health/reconciliation */
+  uint64_t frames;
+  double newest_jump;
+  double largest_jump;
+} rk_reconciliation;
 
 typedef struct rk_discarded {
   int64_t gap[3];
@@ -320,6 +381,38 @@ typedef struct rk_body { /* world.bodies/body */
   double velocity[3];
   double angular_velocity[3];
 } rk_body;
+
+typedef struct rk_scene_head { /* world.scene, 6.5 */
+  uint64_t revision;
+  uint64_t needs;
+  uint64_t left_out;
+  double gravity[3];
+  char name[64];
+  uint32_t body_count;
+  uint32_t collider_count;
+} rk_scene_head;
+
+typedef struct rk_scene_body { /* world.scene/body */
+  uint32_t body;
+  uint32_t generation;
+  uint32_t fixed;
+  uint32_t collider_count;
+  char name[64];
+} rk_scene_body;
+
+typedef struct rk_scene_collider { /* world.scene/collider */
+  uint32_t shape;
+  uint32_t reserved;
+  double dimensions[3];
+  double position[3];
+  double orientation[4];
+  double colour[4];
+} rk_scene_collider;
+
+typedef struct rk_scene_mesh { /* world.scene/mesh */
+  uint8_t sha256[32];
+  char path[224];
+} rk_scene_mesh;
 
 RK_SIZE(rk_stream_entry, 64);
 RK_AT(rk_stream_entry, cursor_offset, 8);
@@ -368,6 +461,22 @@ RK_AT(rk_world_health, lateness, 288);
 RK_SIZE(rk_bodies_head, 8);
 RK_SIZE(rk_body, 120);
 RK_AT(rk_body, orientation, 40);
+RK_SIZE(rk_plane_velocity, 24);
+RK_SIZE(rk_plane_friction, 16);
+RK_SIZE(rk_plane_recovery, 8);
+RK_SIZE(rk_local_head, 16);
+RK_SIZE(rk_local_body, 224);
+RK_AT(rk_local_body, mass, 16);
+RK_AT(rk_local_body, orientation, 96);
+RK_AT(rk_local_body, angular_acceleration, 200);
+RK_SIZE(rk_contact_plane, 128);
+RK_AT(rk_contact_plane, gap, 56);
+RK_AT(rk_contact_plane, impulse, 104);
+RK_SIZE(rk_reconciliation, 24);
+RK_SIZE(rk_scene_head, 120);
+RK_SIZE(rk_scene_body, 80);
+RK_SIZE(rk_scene_collider, 120);
+RK_SIZE(rk_scene_mesh, 256);
 
 /* ---------------------------------------------------------------------------------------------
  * Messages as a peer holds them, with all blocks filled in */
@@ -383,7 +492,13 @@ typedef struct rk_tick {
 typedef struct rk_frame {
   rk_frame_head head;
   rk_plane plane[RK_MAX_PLANES];
-  rk_plane_surface surface[RK_MAX_PLANES]; /* of plane[i]; stiffness 0 = the haptic side's own */
+  rk_plane_surface surface[RK_MAX_PLANES]; /* of plane[i], like the next three; 0 = the default */
+  rk_plane_velocity velocity[RK_MAX_PLANES];
+  rk_plane_friction friction[RK_MAX_PLANES];
+  rk_plane_recovery recovery[RK_MAX_PLANES];
+  rk_local_head local;
+  rk_local_body local_body[RK_MAX_LOCAL_BODIES];
+  rk_contact_plane contact[RK_MAX_LOCAL_BODIES][RK_MAX_CONTACT_PLANES]; /* of local_body[i] */
 } rk_frame;
 
 /* Room for the largest message of a stream. */
@@ -392,7 +507,15 @@ typedef struct rk_frame {
               RK_MAX_POINTERS * (sizeof(rk_pointer) + sizeof(rk_pointer_rotation)) +           \
               RK_MAX_CHANNELS * sizeof(rk_channel) + sizeof(rk_ground)))
 #define RK_FRAME_BYTES                                                                         \
-  ((uint32_t)(sizeof(rk_frame_head) + RK_MAX_PLANES * (sizeof(rk_plane) + sizeof(rk_plane_surface))))
+  ((uint32_t)(sizeof(rk_frame_head) +                                                          \
+              RK_MAX_PLANES * (sizeof(rk_plane) + sizeof(rk_plane_surface) +                   \
+                               sizeof(rk_plane_velocity) + sizeof(rk_plane_friction) +         \
+                               sizeof(rk_plane_recovery)) +                                    \
+              sizeof(rk_local_head) +                                                          \
+              RK_MAX_LOCAL_BODIES *                                                            \
+                  (sizeof(rk_local_body) + RK_MAX_CONTACT_PLANES * sizeof(rk_contact_plane))))
+#define RK_FRAME_ROOM (16384u - 32u) /* 6.2-2: what a frame's slot should have room for */
+#define RK_HAPTIC_HEALTH_BYTES ((uint32_t)(sizeof(rk_haptic_health) + sizeof(rk_reconciliation)))
 
 /* What stands beside a payload. */
 typedef struct rk_received {
@@ -418,6 +541,16 @@ enum rk_verdict {
 static inline int rk_finite(const double *values, size_t count) {
   for (size_t i = 0; i < count; ++i) {
     if (!isfinite(values[i])) return 0;
+  }
+  return 1;
+}
+
+/* Likewise for a stretch of a record that holds nothing but doubles. */
+static inline int rk_finite_span(const void *record, size_t from, size_t to) {
+  for (; from < to; from += sizeof(double)) {
+    double value;
+    memcpy(&value, (const unsigned char *)record + from, sizeof value);
+    if (!isfinite(value)) return 0;
   }
   return 1;
 }
@@ -485,6 +618,35 @@ static inline enum rk_verdict rk_check_tick(rk_tick *m) {
   return RK_SOUND;
 }
 
+/* 6.2-10 */
+static inline int rk_is_inertia(const double *inertia) {
+  const double trace = inertia[0] + inertia[3] + inertia[5];
+  double m[6];
+  if (!(trace >= 1e-18 && trace <= 1e18)) return 0;
+  for (int i = 0; i < 6; ++i) m[i] = inertia[i] / trace;
+  return m[0] > 1e-12 && m[0] * m[3] - m[1] * m[1] > 1e-12 &&
+         m[0] * (m[3] * m[5] - m[4] * m[4]) - m[1] * (m[1] * m[5] - m[2] * m[4]) +
+                 m[2] * (m[1] * m[4] - m[2] * m[3]) >
+             1e-12;
+}
+
+static inline enum rk_verdict rk_check_local_body(rk_local_body *b, rk_contact_plane *contacts) {
+  double norm;
+  if (!rk_finite_span(b, offsetof(rk_local_body, mass), sizeof *b)) return RK_BAD_NUMBER;
+  if (b->mass < 1e-9 || b->mass > 1e9 || !rk_is_inertia(b->inertia)) return RK_BAD_RANGE;
+  norm = rk_normalise(b->orientation, 4);
+  if (!(norm >= 0.99 && norm <= 1.01)) return RK_BAD_QUATERNION;
+  for (uint32_t i = 0; i < b->contact_count; ++i) {
+    rk_contact_plane *c = &contacts[i];
+    if (!rk_finite_span(c, offsetof(rk_contact_plane, point), sizeof *c)) return RK_BAD_NUMBER;
+    if (c->friction < 0 || c->other_inverse_mass < 0) return RK_BAD_RANGE;
+    norm = rk_normalise(c->normal, 3);
+    if (!isfinite(norm)) return RK_BAD_NUMBER;
+    if (!(norm > 1e-12)) return RK_BAD_NORMAL;
+  }
+  return RK_SOUND;
+}
+
 /* Likewise; renormalises normals. */
 static inline enum rk_verdict rk_check_frame(rk_frame *m) {
   if (m->head.plane_count > RK_MAX_PLANES) return RK_BAD_COUNT;
@@ -494,15 +656,33 @@ static inline enum rk_verdict rk_check_frame(rk_frame *m) {
   for (uint32_t i = 0; i < m->head.plane_count; ++i) {
     rk_plane *p = &m->plane[i];
     const rk_plane_surface *s = &m->surface[i];
+    const rk_plane_friction *f = &m->friction[i];
+    const double recovery_s = m->recovery[i].recovery_s;
     double norm;
     if (p->pointer >= RK_MAX_POINTERS) return RK_BAD_IDENTITY;
-    if (!rk_finite(p->point, 3) || !rk_finite(&s->stiffness, 1) || !rk_finite(&s->damping, 1)) {
+    if (!rk_finite(p->point, 3) || !rk_finite_span(s, 0, sizeof *s) ||
+        !rk_finite(m->velocity[i].velocity, 3) || !rk_finite_span(f, 0, sizeof *f) ||
+        !isfinite(recovery_s)) {
       return RK_BAD_NUMBER;
     }
-    if (s->stiffness < 0 || s->damping < 0) return RK_BAD_RANGE;
+    if (s->stiffness < 0 || s->damping < 0 || f->static_friction < 0 || f->dynamic_friction < 0 ||
+        recovery_s < 0 || recovery_s > 10) {
+      return RK_BAD_RANGE;
+    }
     norm = rk_normalise(p->normal, 3);
     if (!isfinite(norm)) return RK_BAD_NUMBER;
     if (!(norm > 1e-12)) return RK_BAD_NORMAL;
+  }
+  if (m->local.local_body_count > RK_MAX_LOCAL_BODIES) return RK_BAD_COUNT;
+  if (m->local.local_body_count > 0 && !rk_is_period(m->local.substep_ns)) return RK_BAD_RANGE;
+  for (uint32_t i = 0; i < m->local.local_body_count; ++i) {
+    enum rk_verdict verdict;
+    for (uint32_t j = 0; j < i; ++j) {
+      if (m->local_body[j].body == m->local_body[i].body) return RK_BAD_IDENTITY;
+    }
+    if (m->local_body[i].contact_count > RK_MAX_CONTACT_PLANES) return RK_BAD_COUNT;
+    verdict = rk_check_local_body(&m->local_body[i], m->contact[i]);
+    if (verdict != RK_SOUND) return verdict;
   }
   return RK_SOUND;
 }
@@ -525,12 +705,6 @@ static inline uint32_t rk_tick_bytes(const rk_tick_head *head, uint32_t blocks) 
                          : 0) +
                     ((blocks & RK_TICK_GROUND) != 0 ? sizeof(rk_ground) : 0));
 }
-static inline uint32_t rk_frame_bytes(const rk_frame_head *head, uint32_t blocks) {
-  return (uint32_t)(sizeof(rk_frame_head) + head->plane_count * sizeof(rk_plane) +
-                    ((blocks & RK_FRAME_SURFACES) != 0 ? head->plane_count * sizeof(rk_plane_surface)
-                                                       : 0));
-}
-
 /* Exactly what is known, or at least that if blocks of a later version follow. */
 static inline int rk_length_agrees(const rk_received *r, uint32_t bytes, size_t room_bytes,
                                    uint32_t known_blocks) {
@@ -589,42 +763,108 @@ static inline enum rk_verdict rk_decode_tick(const uint64_t *words, size_t room_
   return verdict;
 }
 
+static inline int rk_any(const void *records, size_t bytes) { /* a value that is not 0 */
+  for (size_t i = 0; i < bytes; i += sizeof(double)) {
+    double value;
+    memcpy(&value, (const unsigned char *)records + i, sizeof value);
+    if (value < 0 || value > 0) return 1;
+  }
+  return 0;
+}
+
 /* Room for RK_FRAME_BYTES. */
 static inline int rk_encode_frame(const rk_frame *m, uint64_t *words, rk_received *shape) {
+  const size_t planes = m->head.plane_count;
+  const uint32_t bodies = m->local.local_body_count;
   uint32_t at = 0;
-  uint32_t blocks = 0;
-  if (m->head.plane_count > RK_MAX_PLANES) return 0;
-  for (uint32_t i = 0; i < m->head.plane_count; ++i) {
-    const rk_plane_surface *s = &m->surface[i];
-    if (s->stiffness < 0 || s->stiffness > 0 || s->damping < 0 || s->damping > 0) {
-      blocks = RK_FRAME_SURFACES;
+  uint32_t blocks = bodies > 0 ? RK_FRAME_LOCAL_BODIES : 0;
+  if (planes > RK_MAX_PLANES || bodies > RK_MAX_LOCAL_BODIES) return 0;
+  for (uint32_t i = 0; i < bodies; ++i) {
+    if (m->local_body[i].contact_count > RK_MAX_CONTACT_PLANES) return 0;
+  }
+  if (rk_any(m->surface, planes * sizeof m->surface[0])) blocks |= RK_FRAME_SURFACES;
+  if (rk_any(m->velocity, planes * sizeof m->velocity[0])) blocks |= RK_FRAME_VELOCITIES;
+  if (rk_any(m->friction, planes * sizeof m->friction[0])) blocks |= RK_FRAME_FRICTION;
+  if (rk_any(m->recovery, planes * sizeof m->recovery[0])) blocks |= RK_FRAME_RECOVERY;
+  rk_put(words, &at, &m->head, sizeof m->head);
+  rk_put(words, &at, m->plane, planes * sizeof m->plane[0]);
+  if ((blocks & RK_FRAME_SURFACES) != 0) {
+    rk_put(words, &at, m->surface, planes * sizeof m->surface[0]);
+  }
+  if ((blocks & RK_FRAME_VELOCITIES) != 0) {
+    rk_put(words, &at, m->velocity, planes * sizeof m->velocity[0]);
+  }
+  if ((blocks & RK_FRAME_FRICTION) != 0) {
+    rk_put(words, &at, m->friction, planes * sizeof m->friction[0]);
+  }
+  if ((blocks & RK_FRAME_RECOVERY) != 0) {
+    rk_put(words, &at, m->recovery, planes * sizeof m->recovery[0]);
+  }
+  if ((blocks & RK_FRAME_LOCAL_BODIES) != 0) {
+    rk_put(words, &at, &m->local, sizeof m->local);
+    rk_put(words, &at, m->local_body, bodies * sizeof m->local_body[0]);
+    for (uint32_t i = 0; i < bodies; ++i) {
+      rk_put(words, &at, m->contact[i], m->local_body[i].contact_count * sizeof m->contact[0][0]);
     }
   }
-  rk_put(words, &at, &m->head, sizeof m->head);
-  rk_put(words, &at, m->plane, m->head.plane_count * sizeof(rk_plane));
-  if (blocks != 0) rk_put(words, &at, m->surface, m->head.plane_count * sizeof(rk_plane_surface));
   shape->used_bytes = at;
   shape->blocks = blocks;
   return 1;
 }
 
-static inline enum rk_verdict rk_decode_frame(const uint64_t *words, size_t room_bytes,
-                                              const rk_received *r, rk_frame *m) {
-  rk_frame copy;
-  uint32_t at = 0;
-  enum rk_verdict verdict;
-  if (r->used_bytes < sizeof copy.head || room_bytes < sizeof copy.head) return RK_BAD_LENGTH;
-  memset(&copy, 0, sizeof copy);
-  rk_get(words, &at, &copy.head, sizeof copy.head);
-  if (copy.head.plane_count > RK_MAX_PLANES) return RK_BAD_COUNT;
-  if (!rk_length_agrees(r, rk_frame_bytes(&copy.head, r->blocks), room_bytes, RK_FRAME_SURFACES)) {
+/* Takes `bytes` from a payload unless they lie beyond its end. */
+static inline int rk_take(const uint64_t *words, uint32_t end, uint32_t *at, void *records,
+                          size_t bytes) {
+  if (bytes > end - *at) return 0;
+  rk_get(words, at, records, bytes);
+  return 1;
+}
+
+static inline enum rk_verdict rk_decode_local(const uint64_t *words, uint32_t end, uint32_t *at,
+                                              rk_frame *m) {
+  if (!rk_take(words, end, at, &m->local, sizeof m->local)) return RK_BAD_LENGTH;
+  if (m->local.local_body_count > RK_MAX_LOCAL_BODIES) return RK_BAD_COUNT;
+  if (!rk_take(words, end, at, m->local_body,
+               m->local.local_body_count * sizeof m->local_body[0])) {
     return RK_BAD_LENGTH;
   }
-  rk_get(words, &at, copy.plane, copy.head.plane_count * sizeof(rk_plane));
-  if ((r->blocks & RK_FRAME_SURFACES) != 0) {
-    rk_get(words, &at, copy.surface, copy.head.plane_count * sizeof(rk_plane_surface));
+  for (uint32_t i = 0; i < m->local.local_body_count; ++i) {
+    if (m->local_body[i].contact_count > RK_MAX_CONTACT_PLANES) return RK_BAD_COUNT;
+    if (!rk_take(words, end, at, m->contact[i],
+                 m->local_body[i].contact_count * sizeof m->contact[0][0])) {
+      return RK_BAD_LENGTH;
+    }
   }
-  verdict = rk_check_frame(&copy);
+  return RK_SOUND;
+}
+
+static inline enum rk_verdict rk_decode_frame(const uint64_t *words, size_t room_bytes,
+                                              const rk_received *r, rk_frame *m) {
+  const uint32_t known = RK_FRAME_SURFACES | RK_FRAME_VELOCITIES | RK_FRAME_FRICTION |
+                         RK_FRAME_RECOVERY | RK_FRAME_LOCAL_BODIES;
+  const uint32_t end = r->used_bytes < room_bytes ? r->used_bytes : (uint32_t)room_bytes;
+  rk_frame copy;
+  size_t planes;
+  uint32_t at = 0;
+  enum rk_verdict verdict = RK_SOUND;
+  memset(&copy, 0, sizeof copy);
+  if (!rk_take(words, end, &at, &copy.head, sizeof copy.head)) return RK_BAD_LENGTH;
+  planes = copy.head.plane_count;
+  if (planes > RK_MAX_PLANES) return RK_BAD_COUNT;
+  if (!rk_take(words, end, &at, copy.plane, planes * sizeof copy.plane[0]) ||
+      ((r->blocks & RK_FRAME_SURFACES) != 0 &&
+       !rk_take(words, end, &at, copy.surface, planes * sizeof copy.surface[0])) ||
+      ((r->blocks & RK_FRAME_VELOCITIES) != 0 &&
+       !rk_take(words, end, &at, copy.velocity, planes * sizeof copy.velocity[0])) ||
+      ((r->blocks & RK_FRAME_FRICTION) != 0 &&
+       !rk_take(words, end, &at, copy.friction, planes * sizeof copy.friction[0])) ||
+      ((r->blocks & RK_FRAME_RECOVERY) != 0 &&
+       !rk_take(words, end, &at, copy.recovery, planes * sizeof copy.recovery[0]))) {
+    return RK_BAD_LENGTH;
+  }
+  if ((r->blocks & RK_FRAME_LOCAL_BODIES) != 0) verdict = rk_decode_local(words, end, &at, &copy);
+  if (verdict == RK_SOUND && !rk_length_agrees(r, at, room_bytes, known)) verdict = RK_BAD_LENGTH;
+  if (verdict == RK_SOUND) verdict = rk_check_frame(&copy);
   if (verdict == RK_SOUND) *m = copy;
   return verdict;
 }
@@ -1067,7 +1307,7 @@ static inline int rk_reader_of(const rk_view *view, uint32_t type_id, rk_reader 
 
 typedef struct rk_stream_spec {
   uint32_t type_id;
-  uint32_t payload_bytes; /* RK_TICK_BYTES, RK_FRAME_BYTES, ... */
+  uint32_t payload_bytes; /* RK_TICK_BYTES, RK_FRAME_ROOM, ... */
   uint32_t slot_count;    /* a power of two, 4..65536 */
   uint64_t period_ns;     /* nominal; 0 = aperiodic */
 } rk_stream_spec;
@@ -1193,7 +1433,7 @@ static inline uint64_t rk_arrange(const rk_stream_spec *streams, uint32_t count,
     }
     memset(e, 0, sizeof *e);
     e->type_id = s->type_id;
-    e->type_version = 1;
+    e->type_version = s->type_id == RK_WORLD_FRAME || s->type_id == RK_HAPTIC_HEALTH ? 2 : 1;
     e->cursor_offset = RK_HEADER_BYTES + (uint64_t)RK_LINE_BYTES * i;
     e->ring_offset = ring;
     e->slot_stride = (s->payload_bytes + 32u + RK_LINE_BYTES - 1u) / RK_LINE_BYTES * RK_LINE_BYTES;

@@ -83,7 +83,7 @@ bool WaitForPush(const TickWatch& watch) {
 }
 
 bool WaitForRelease(const TickWatch& watch) {
-  return Eventually([&] { return watch.Latest().force == 0; }, 15);
+  return Eventually([&] { return watch.Latest().force < 1e-12; }, 15);
 }
 
 }  // namespace
@@ -239,6 +239,29 @@ TEST_CASE("both sides in Python: contact, exact books, a restart of each") {
   SettledBooks(*haptic_view);
   const protocol::Body block = ReadMovingBody(*world_view);
   CHECK(block.mass * std::abs(block.velocity[0]) <= Norm(ReadWorldHealth(*world_view).applied));
+}
+
+TEST_CASE("a world of a page of C on rikiseki.h holds haptic_server and peer.py in contact") {
+  const bool python = GENERATE(false, true);
+  const Instance instance;
+  std::optional<Child> world(std::in_place, std::vector{Program("rikiseki_h_world"), instance.name});
+  std::optional<Child> haptic(std::in_place,
+                              python ? Peer("haptic", instance.name) : HapticServer(instance.name));
+  const auto haptic_view = Observe(instance.name, Role::kHaptic);
+  TickWatch watch(instance.name, ReadHapticHealth(*haptic_view).slew_limit);
+  REQUIRE(WaitForPush(watch));
+  world->Signal(SIGKILL);
+  world->Wait();
+  CHECK(Eventually([&] { return watch.Latest().force < 1e-12; }, 1));
+  world.emplace(std::vector{Program("rikiseki_h_world"), instance.name});
+  REQUIRE(WaitForPush(watch));
+  REQUIRE(WaitForRelease(watch));
+  const protocol::Books books = SettledBooks(*haptic_view);
+  CHECK(Norm(books.discarded) > 0);
+  CHECK(Norm(books.applied) == 0);
+  CheckSafe(watch);
+  world->Signal(SIGTERM);
+  CHECK(world->Wait() == 0);
 }
 
 TEST_CASE("peer.py ends with the statuses of SPEC.md 5.2") {

@@ -120,7 +120,7 @@ int main(int argc, char **argv) {
   static peer haptic;
   static rk_frame frame;
   const char *instance = argc > 1 ? argv[1] : "0";
-  const rk_stream_spec stream = {RK_WORLD_FRAME, RK_FRAME_BYTES, 8, kPeriodNs};
+  const rk_stream_spec stream = {RK_WORLD_FRAME, RK_FRAME_ROOM, 8, kPeriodNs};
   const struct timespec period = {0, (long)kPeriodNs};
   uint64_t words[RK_FRAME_BYTES / 8];
   rk_segment own;
