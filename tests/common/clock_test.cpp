@@ -41,7 +41,8 @@ TEST_CASE("missed deadlines are skipped and counted, and the grid is kept") {
   CHECK(schedule.deadline_ns() == 13000);
 }
 
-TEST_CASE("deadlines that were slept through are known when the sleep ends, and not counted twice") {
+TEST_CASE(
+    "deadlines that were slept through are known when the sleep ends, and not counted twice") {
   PeriodicSchedule schedule(0, 1000);
   CHECK(schedule.WakeUp(1000) == 0);
   CHECK(schedule.WakeUp(1999) == 0);

@@ -43,8 +43,7 @@ void RequireZeroWithin(WorldPlayer& player, std::size_t from, std::int64_t end_n
                                 " is the bound");
 }
 
-void StatedBound(WorldPlayer& player) {
-  const std::int64_t bound = player.ZeroForceBoundNs();
+void CheckStated(WorldPlayer& player, std::int64_t bound) {
   const std::int64_t table = std::max<std::int64_t>(5 * player.period_ns, 250'000'000) + 100'000'000;
   const std::int64_t ticks = 10 * player.seen().back().period_ns;
   if (bound > table + ticks) {
@@ -64,7 +63,7 @@ void Late(WorldPlayer& player) {
   for (const SeenTick& tick : seen) {
     if (tick.start_ns < pause + 70'000'000 || tick.start_ns > pause + 200'000'000) continue;
     const double gap = Dot(Difference(tick.position, plane.point), plane.normal) - tick.radius;
-    if (gap > -0.0003) continue;
+    if (gap > -0.0001) continue;
     ++looks;
     Require(Norm(tick.force) >= kZeroForce,
             "the surface is not held: no force " + Ms(tick.start_ns - pause) + " after the last frame");
@@ -82,7 +81,7 @@ void Silence(WorldPlayer& player) {
   player.publishing = false;  // heartbeats go on: it is the frames that count
   const std::int64_t end = MonotonicNow();
   RequireZeroWithin(player, player.seen().size() - 1, end, bound, "the world fell silent");
-  StatedBound(player);
+  CheckStated(player, bound);
 }
 
 void Returns(WorldPlayer& player) {

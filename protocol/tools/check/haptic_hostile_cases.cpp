@@ -27,7 +27,7 @@ std::size_t OfPlane(const char* field) {
 double ThereShouldBeForce(const WorldPlayer& player, const SeenTick& seen) {
   const Plane& plane = player.planes[0];
   const double gap = Dot(Difference(seen.position, plane.point), plane.normal) - seen.radius;
-  return gap < -0.0003 ? -gap : 0;
+  return gap < -0.0001 ? -gap : 0;
 }
 
 /// Three spoilt frames among good ones: none is displayed, the good ones are, the surface stays.

@@ -1,12 +1,14 @@
 #include "protocol/tools/check/lint.h"
 
 #include <sys/stat.h>
+#include <time.h>
 
 #include <algorithm>
 #include <atomic>
 #include <functional>
 #include <system_error>
 #include <thread>
+#include <utility>
 
 #include "common/clock.h"
 
@@ -30,6 +32,20 @@ const StreamEntry& EntryOf(const RawView& view, StreamType type) {
   Fail("there is no stream of type " + std::to_string(static_cast<std::uint32_t>(type)));
 }
 
+constexpr std::int64_t kOldEpochNs = 60'000'000'000;
+
+/// When the object of a name was made, ns of CLOCK_MONOTONIC; false if it is gone.
+std::pair<std::int64_t, bool> MadeNs(const std::string& name) {
+  struct stat status {};
+  if (stat(("/dev/shm" + name).c_str(), &status) != 0) return {0, false};
+  timespec real{};
+  clock_gettime(CLOCK_REALTIME, &real);
+  const auto ns = [](const timespec& time) {
+    return static_cast<std::int64_t>(time.tv_sec) * 1'000'000'000 + time.tv_nsec;
+  };
+  return {ns(status.st_mtim) - ns(real) + MonotonicNow(), true};
+}
+
 template <typename Done>
 void WaitFor(double seconds, Done&& done) {
   const std::int64_t limit = MonotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
@@ -40,10 +56,10 @@ void WaitFor(double seconds, Done&& done) {
 }  // namespace
 
 RawView::RawView(const std::string& instance, Role role) {
-  const std::string name = SegmentName(instance, role);
-  object_ = SharedObject::Open(name, false);
+  name_ = SegmentName(instance, role);
+  object_ = SharedObject::Open(name_, false);
   bytes_ = object_->Info().bytes;
-  if (bytes_ < kHeaderBytes) throw Outcome{Verdict::kFailed, name + " is shorter than a header"};
+  if (bytes_ < kHeaderBytes) throw Outcome{Verdict::kFailed, name_ + " is shorter than a header"};
   header_ = static_cast<SegmentHeader*>(object_->Map(bytes_));
 }
 
@@ -78,6 +94,13 @@ void CheckEpoch(const RawView& view) {
   Require(view.header().epoch <= now,
           "epoch " + std::to_string(view.header().epoch) + " lies in the future: it is a time of "
           "CLOCK_MONOTONIC, now " + std::to_string(now));
+  // The kernel knows when the object was made, by the other clock. Suspension and clock steps forward
+  // only make it look older.
+  const auto [made_ns, known] = MadeNs(view.name());
+  if (!known) return;
+  const std::int64_t older = made_ns - static_cast<std::int64_t>(view.header().epoch);
+  Require(older < kOldEpochNs, "epoch is " + Num(static_cast<double>(older) * 1e-9) +
+                                   " s older than the object: an epoch of an earlier life?");
 }
 
 void CheckPermissions(const std::string& instance, Role role) {

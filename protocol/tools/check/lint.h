@@ -15,11 +15,13 @@ class RawView {
  public:
   /// Throws std::system_error.
   RawView(const std::string& instance, Role role);
+  const std::string& name() const { return name_; }
   const SegmentHeader& header() const { return *header_; }
   std::uint64_t bytes() const { return bytes_; }
   Ring RingOf(const StreamEntry& entry) const;
 
  private:
+  std::string name_;
   std::unique_ptr<SharedObject> object_;
   SegmentHeader* header_ = nullptr;
   std::uint64_t bytes_ = 0;
@@ -33,8 +35,7 @@ void CheckPermissions(const std::string& instance, Role role);
 void CheckHeartbeat(const RawView& view, StreamType main, double seconds);
 void CheckPublication(const RawView& view, StreamType main, double seconds);
 
-
-/// Every check on the segment of one role; `name` is for the case ids.
+/// Every check on the segment of one role, its state as it is.
 std::vector<Result> Inspect(const std::string& instance, Role role);
 
 }  // namespace rikiseki::protocol::check

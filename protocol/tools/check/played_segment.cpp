@@ -127,6 +127,10 @@ void PlayedSegment::SetState(SegmentState state) {
   Store(header_->state, static_cast<std::uint64_t>(state), std::memory_order_release);
 }
 
+void PlayedSegment::CountRejected(std::uint64_t total) {
+  Store(header_->rejected, total, std::memory_order_relaxed);
+}
+
 void PlayedSegment::Close() {
   if (ended_) return;
   SetState(SegmentState::kClosed);

@@ -51,6 +51,8 @@ class PlayedSegment {
   Ring RingOf(StreamType type) const;
   void Heartbeat(std::uint64_t tick, std::uint64_t now_ns);
   void SetState(SegmentState state);
+  /// The header's `rejected`.
+  void CountRejected(std::uint64_t total);
 
   /// state = closed, and the name is gone.
   void Close();

@@ -1,11 +1,33 @@
 #include "protocol/tools/check/suite.h"
 
+#include <memory>
+
 #include "protocol/tools/check/haptic_cases.h"
 #include "protocol/tools/check/lint.h"
 #include "protocol/tools/check/world_cases.h"
 
 namespace rikiseki::protocol::check {
 namespace {
+
+constexpr char kHapticReady[] = "haptic/5.2-9/ready";
+constexpr char kWorldReady[] = "world/5.2-9/ready";
+
+/// Somebody to judge; a segment that is there and cannot be attached is a verdict by itself.
+template <typename Player>
+std::unique_ptr<Player> Meet(const PlayOptions& options, Role role, const char* id,
+                             std::span<const std::string> wanted, double wait_s,
+                             Reporter& reporter) {
+  try {
+    auto player = std::make_unique<Player>(options, wait_s);
+    if (Selected(id, wanted)) reporter.Add({id, {}, 0});
+    return player;
+  } catch (const SegmentError& error) {
+    if (StatObject(SegmentName(options.instance, role)).id == ObjectId{}) throw;
+    if (error.exit_code() != 1) throw;
+    reporter.Add({id, {Verdict::kFailed, error.what()}, wait_s});
+    return nullptr;
+  }
+}
 
 std::vector<HapticCase> AllHapticCases() {
   std::vector<HapticCase> all;
@@ -42,7 +64,7 @@ void RunAll(const std::vector<Case<Player>>& cases, Player& player,
 }  // namespace
 
 std::vector<std::string> CaseIds() {
-  std::vector<std::string> ids;
+  std::vector<std::string> ids = {kHapticReady, kWorldReady};
   for (const HapticCase& one : AllHapticCases()) ids.emplace_back(one.id);
   for (const WorldCase& one : AllWorldCases()) ids.emplace_back(one.id);
   return ids;
@@ -50,14 +72,16 @@ std::vector<std::string> CaseIds() {
 
 void JudgeHaptic(const PlayOptions& options, std::span<const std::string> wanted, double wait_s,
                  Reporter& reporter) {
-  WorldPlayer player(options, wait_s);
-  RunAll(AllHapticCases(), player, wanted, reporter);
+  const auto player =
+      Meet<WorldPlayer>(options, Role::kHaptic, kHapticReady, wanted, wait_s, reporter);
+  if (player) RunAll(AllHapticCases(), *player, wanted, reporter);
 }
 
 void JudgeWorld(const PlayOptions& options, std::span<const std::string> wanted, double wait_s,
                 Reporter& reporter) {
-  HapticPlayer player(options, wait_s);
-  RunAll(AllWorldCases(), player, wanted, reporter);
+  const auto player =
+      Meet<HapticPlayer>(options, Role::kWorld, kWorldReady, wanted, wait_s, reporter);
+  if (player) RunAll(AllWorldCases(), *player, wanted, reporter);
 }
 
 void InspectBoth(const std::string& instance, std::span<const std::string> wanted,
