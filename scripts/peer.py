@@ -508,7 +508,7 @@ class Reader:
             return None
         now = now_ns()
         if self.entry.period_ns and self.seen:  # 9.2-9
-            most = 4 * (now - self.seen_ns) // self.entry.period_ns + self.entry.slot_count
+            most = 4 * ((now - self.seen_ns) // self.entry.period_ns + self.entry.slot_count)
             if number - self.seen > most:
                 self.backwards = True
                 return None

@@ -1,14 +1,11 @@
 /* The C half of rikiseki_h_test: rikiseki.h compiled as C11. */
-#include "protocol/rikiseki.h"  /* first: it asks for _GNU_SOURCE */
-
 #include "tests/protocol/rikiseki_h_test.h"
-
 
 /* Every field that travels, in the order of layout.golden.txt, with the offset that this compiler gives it. */
 #define FIELD(record, type, field, kind) \
-  {record "." #field ":" kind, offsetof(type, field), sizeof(((type *)0)->field)}
+  { record "." #field ":" kind, offsetof(type, field), sizeof(((type*)0)->field) }
 static const struct {
-  const char *name;
+  const char* name;
   size_t offset, bytes;
 } kFields[] = {
     FIELD("segment_header", rk_segment_header, magic, "u64"),
@@ -208,7 +205,7 @@ static const struct {
     FIELD("world.scene/mesh", rk_scene_mesh, path, "char[224]"),
 };
 
-size_t rk_test_layout(char *text, size_t room) {
+size_t rk_test_layout(char* text, size_t room) {
   size_t at = 0;
   for (size_t i = 0; i < sizeof kFields / sizeof kFields[0]; ++i) {
     at += (size_t)snprintf(text + at, room - at, "%s:%zu:%zu\n", kFields[i].name, kFields[i].offset,
@@ -217,8 +214,8 @@ size_t rk_test_layout(char *text, size_t room) {
   return at;
 }
 
-int rk_test_recode(uint32_t type, const uint64_t *words, size_t bytes, uint32_t used, uint32_t blocks,
-                   uint64_t *again, uint32_t *again_used, uint32_t *again_blocks) {
+int rk_test_recode(uint32_t type, const uint64_t* words, size_t bytes, uint32_t used,
+                   uint32_t blocks, uint64_t* again, uint32_t* again_used, uint32_t* again_blocks) {
   static rk_tick tick;
   static rk_frame frame;
   rk_received shape;
@@ -245,9 +242,9 @@ struct rk_test_segment {
   rk_writer ticks;
 };
 
-int rk_test_attach(const char *instance, uint32_t role, struct rk_test_view **out, char why[256]) {
+int rk_test_attach(const char* instance, uint32_t role, struct rk_test_view** out, char why[256]) {
   static const rk_need need = {RK_HAPTIC_TICK, 1, 0};
-  struct rk_test_view *view = (struct rk_test_view *)calloc(1, sizeof *view);
+  struct rk_test_view* view = (struct rk_test_view*)calloc(1, sizeof *view);
   const int status = (int)rk_attach(&view->view, instance, role, &need, role == RK_HAPTIC ? 1 : 0);
   snprintf(why, 256, "%s", view->view.why);
   *out = NULL;
@@ -260,15 +257,27 @@ int rk_test_attach(const char *instance, uint32_t role, struct rk_test_view **ou
   return status;
 }
 
-uint64_t rk_test_epoch(const struct rk_test_view *view) { return view->view.header.epoch; }
-uint64_t rk_test_state(const struct rk_test_view *view) { return rk_state(&view->view); }
-uint64_t rk_test_heartbeat(const struct rk_test_view *view) { return rk_heartbeat_of(&view->view); }
-int rk_test_alive(const struct rk_test_view *view) { return rk_owner_alive(&view->view); }
-int rk_test_replaced(const struct rk_test_view *view) { return rk_replaced(&view->view); }
-uint64_t rk_test_lost(const struct rk_test_view *view) { return view->ticks.lost; }
+uint64_t rk_test_epoch(const struct rk_test_view* view) {
+  return view->view.header.epoch;
+}
+uint64_t rk_test_state(const struct rk_test_view* view) {
+  return rk_state(&view->view);
+}
+uint64_t rk_test_heartbeat(const struct rk_test_view* view) {
+  return rk_heartbeat_of(&view->view);
+}
+int rk_test_alive(const struct rk_test_view* view) {
+  return rk_owner_alive(&view->view);
+}
+int rk_test_replaced(const struct rk_test_view* view) {
+  return rk_replaced(&view->view);
+}
+uint64_t rk_test_lost(const struct rk_test_view* view) {
+  return view->ticks.lost;
+}
 
-int rk_test_read(struct rk_test_view *view, int next, uint64_t *words, size_t bytes, uint64_t *number,
-                 uint64_t *stamp_ns, uint32_t *used, uint32_t *blocks) {
+int rk_test_read(struct rk_test_view* view, int next, uint64_t* words, size_t bytes,
+                 uint64_t* number, uint64_t* stamp_ns, uint32_t* used, uint32_t* blocks) {
   rk_received received;
   enum rk_read_status status;
   memset(&received, 0, sizeof received);
@@ -281,15 +290,16 @@ int rk_test_read(struct rk_test_view *view, int next, uint64_t *words, size_t by
   return (int)status;
 }
 
-void rk_test_detach(struct rk_test_view *view) {
+void rk_test_detach(struct rk_test_view* view) {
   rk_detach(&view->view);
   free(view);
 }
 
-int rk_test_create(const char *instance, struct rk_test_segment **out, char why[256]) {
-  static const rk_stream_spec streams[2] = {{RK_HAPTIC_TICK, RK_TICK_BYTES, 16, 1000000},
-                                            {RK_HAPTIC_HEALTH, RK_HAPTIC_HEALTH_BYTES, 4, 100000000}};
-  struct rk_test_segment *own = (struct rk_test_segment *)calloc(1, sizeof *own);
+int rk_test_create(const char* instance, struct rk_test_segment** out, char why[256]) {
+  static const rk_stream_spec streams[2] = {
+      {RK_HAPTIC_TICK, RK_TICK_BYTES, 16, 1000000},
+      {RK_HAPTIC_HEALTH, RK_HAPTIC_HEALTH_BYTES, 4, 100000000}};
+  struct rk_test_segment* own = (struct rk_test_segment*)calloc(1, sizeof *own);
   const int status = rk_create(&own->segment, instance, RK_HAPTIC, streams, 2, "rikiseki_h_test");
   snprintf(why, 256, "%s", own->segment.why);
   *out = own;
@@ -302,8 +312,8 @@ int rk_test_create(const char *instance, struct rk_test_segment **out, char why[
   return status;
 }
 
-int rk_test_publish(struct rk_test_segment *own, const uint64_t *words, uint32_t used, uint32_t blocks,
-                    uint64_t stamp_ns) {
+int rk_test_publish(struct rk_test_segment* own, const uint64_t* words, uint32_t used,
+                    uint32_t blocks, uint64_t stamp_ns) {
   rk_received shape;
   memset(&shape, 0, sizeof shape);
   shape.used_bytes = used;
@@ -312,16 +322,16 @@ int rk_test_publish(struct rk_test_segment *own, const uint64_t *words, uint32_t
   return rk_publish(&own->ticks, words, &shape, stamp_ns);
 }
 
-uint64_t rk_test_own_state(const struct rk_test_segment *own) {
+uint64_t rk_test_own_state(const struct rk_test_segment* own) {
   return __atomic_load_n(&own->segment.header->state, __ATOMIC_ACQUIRE);
 }
 
-void rk_test_close(struct rk_test_segment *own) {
+void rk_test_close(struct rk_test_segment* own) {
   rk_close(&own->segment);
   free(own);
 }
 
-void rk_test_die(struct rk_test_segment *own) {
+void rk_test_die(struct rk_test_segment* own) {
   struct flock lock = rk_lock_on_byte_0(F_UNLCK);
   fcntl(own->segment.descriptor, F_OFD_SETLK, &lock); /* the map alone would keep it */
   close(own->segment.descriptor);
