@@ -34,8 +34,8 @@ import sys
 import threading
 import time
 
-VERSION = (0, 1)
-LAYOUT_HASH = 0x7F44583709F045DA  # 8.3
+VERSION = (0, 2)
+LAYOUT_HASH = 0xE6EFB47136B26316  # 8.3
 MAGIC = int.from_bytes(b"RIKISEKI", "little")
 BYTE_ORDER = 0x01020304
 HEADER_BYTES = 4096
@@ -75,7 +75,7 @@ class Nonsense(Exception):
 class Record:
     """Fields one after the other: `name:type` or `name:type[count]`, in the words of layout.golden.txt."""
 
-    CODES = {"u16": "H", "u32": "I", "u64": "Q", "i64": "q", "f64": "d", "char": "s"}
+    CODES = {"u8": "B", "u16": "H", "u32": "I", "u64": "Q", "i64": "q", "f64": "d", "char": "s"}
 
     def __init__(self, name, fields):
         self.name = name
@@ -147,34 +147,110 @@ WORLD_HEALTH = Record(
     "applied:i64[3] discarded.gap:i64[3] discarded.coupling:i64[3] discarded.foreign_world:i64[3] "
     "discarded.unknown_body:i64[3] penalty_impulse:f64[3] moving_bodies:u64 resets:u64 " + SCHEDULING +
     "scene:char[64] lateness:u64[256] duration:u64[256]")
+RECONCILIATION = Record("haptic.health/reconciliation", "frames:u64 newest_jump:f64 largest_jump:f64")
+VELOCITY = Record("world.frame/plane_velocity", "velocity:f64[3]")
+FRICTION = Record("world.frame/plane_friction", "static_friction:f64 dynamic_friction:f64")
+RECOVERY = Record("world.frame/plane_recovery", "recovery_s:f64")
+LOCAL = Record("world.frame/local", "local_body_count:u32 reserved:u32 substep_ns:u64")
+LOCAL_BODY = Record("world.frame/local_body", "body:u32 generation:u32 contact_count:u32 reserved:u32 mass:f64 "
+                    "inertia:f64[6] position:f64[3] orientation:f64[4] velocity:f64[3] angular_velocity:f64[3] "
+                    "acceleration:f64[3] angular_acceleration:f64[3]")
+CONTACT_PLANE = Record("world.frame/contact_plane", "other_body:u32 other_generation:u32 point:f64[3] "
+                       "normal:f64[3] gap:f64 friction:f64 other_velocity:f64[3] other_inverse_mass:f64 "
+                       "impulse:f64[3]")
+SCENE = Record("world.scene", "revision:u64 needs:u64 left_out:u64 gravity:f64[3] name:char[64] body_count:u32 "
+               "collider_count:u32")
+SCENE_BODY = Record("world.scene/body", "body:u32 generation:u32 fixed:u32 collider_count:u32 name:char[64]")
+COLLIDER = Record("world.scene/collider", "shape:u32 reserved:u32 dimensions:f64[3] position:f64[3] "
+                  "orientation:f64[4] colour:f64[4]")
+MESH = Record("world.scene/mesh", "sha256:u8[32] path:char[224]")
 BODIES = Record("world.bodies", "body_count:u32 reserved:u32")
 BODY = Record("world.bodies/body", "body:u32 generation:u32 mass:f64 position:f64[3] orientation:f64[4] "
               "velocity:f64[3] angular_velocity:f64[3]")
 
 
+class Cursor:
+    """Takes records from the front of a payload."""
+
+    def __init__(self, data, end):
+        self.data, self.end, self.at = data, min(end, len(data)), 0
+
+    def take(self, record, count=1):
+        demand(count * record.bytes <= self.end - self.at, f"{record.name} lies beyond the end")
+        records = [record.unpack(self.data, self.at + i * record.bytes) for i in range(count)]
+        self.at += count * record.bytes
+        return records
+
+
 class Block:
-    """An optional block: `count` records (a field of the head, or one) if its bit is set."""
+    """An optional block: `count` records (a field of the head, a function of the message, or one)."""
 
-    def __init__(self, bit, key, count, record, default):
-        self.bit, self.key, self.count, self.record, self.default = bit, key, count, record, default
+    def __init__(self, bit, key, count, record, default, most=1):
+        self.bit, self.key, self.count, self.default = bit, key, count, default
+        self.record, self.records, self.most = record, [record], most * record.bytes
 
-    def records(self, message):
-        return message[self.count] if self.count else 1
+    def number(self, message):
+        return self.count(message) if callable(self.count) else message[self.count] if self.count else 1
+
+    def encode(self, message):
+        """Empty if it is left out (6-6); so is an empty list."""
+        if all(entry == self.default for entry in message[self.key]):
+            return b""
+        return b"".join(self.record.pack(entry) for entry in message[self.key])
+
+    def decode(self, message, cursor):
+        message[self.key] = cursor.take(self.record, self.number(message))
+
+    def leave_out(self, message):
+        message[self.key] = [{key: value[:] if isinstance(value, list) else value
+                              for key, value in self.default.items()} for _ in range(self.number(message))]
+
+
+class LocalBlock:
+    """Block 16 of world.frame: `local` = {substep_ns, bodies}, each body with its `contacts`."""
+
+    bit, key = 16, "local"
+    records = [LOCAL, LOCAL_BODY, CONTACT_PLANE]
+    most = LOCAL.bytes + 4 * (LOCAL_BODY.bytes + 16 * CONTACT_PLANE.bytes)
+
+    def encode(self, message):
+        local = message[self.key]
+        if not local:
+            return b""
+        bodies = local["bodies"]
+        for body in bodies:
+            body["contact_count"] = len(body["contacts"])
+        return b"".join([LOCAL.pack(local | {"local_body_count": len(bodies)})] +
+                        [LOCAL_BODY.pack(body) for body in bodies] +
+                        [CONTACT_PLANE.pack(contact) for body in bodies for contact in body["contacts"]])
+
+    def decode(self, message, cursor):
+        local = cursor.take(LOCAL)[0]
+        demand(local["local_body_count"] <= 4, "local_body_count")
+        local["bodies"] = cursor.take(LOCAL_BODY, local["local_body_count"])
+        for body in local["bodies"]:
+            demand(body["contact_count"] <= 16, "contact_count")
+            body["contacts"] = cursor.take(CONTACT_PLANE, body["contact_count"])
+        message[self.key] = local if local["bodies"] else []
+
+    def leave_out(self, message):
+        message[self.key] = []
 
 
 class Message:
     """A message: head, lists of records, optional blocks. In memory: a dict of the head's fields and lists."""
 
-    def __init__(self, type_id, head, lists=(), blocks=(), check=None):
+    def __init__(self, type_id, head, lists=(), blocks=(), check=None, version=1):
         self.type_id, self.head, self.lists, self.blocks, self.check = type_id, head, lists, blocks, check
+        self.version = version  # type_version of the stream
 
     def records(self):
-        return [self.head] + [record for _, _, record, _ in self.lists] + [b.record for b in self.blocks]
+        return ([self.head] + [record for _, _, record, _ in self.lists] +
+                [record for block in self.blocks for record in block.records])
 
     def largest(self):
-        limits = {count: limit for _, count, _, limit in self.lists}
         return (self.head.bytes + sum(record.bytes * limit for _, _, record, limit in self.lists) +
-                sum(block.record.bytes * limits.get(block.count, 1) for block in self.blocks))
+                sum(block.most for block in self.blocks))
 
     def new(self, **fields):
         message = {key: [] for key, *_ in self.lists} | {block.key: [] for block in self.blocks}
@@ -185,7 +261,7 @@ class Message:
         return message
 
     def encode(self, message):
-        """The payload and its block bits. An empty list stands for a block of defaults."""
+        """The payload and its block bits."""
         for key, count, _, _ in self.lists:
             message[count] = len(message[key])
         parts = [self.head.pack(message)]
@@ -193,44 +269,29 @@ class Message:
             parts += [record.pack(entry) for entry in message[key]]
         bits = 0
         for block in self.blocks:
-            if any(entry != block.default for entry in message[block.key]):  # 6-6
+            part = block.encode(message)
+            if part:
                 bits |= block.bit
-                parts += [block.record.pack(entry) for entry in message[block.key]]
+                parts.append(part)
         return b"".join(parts), bits
 
     def decode(self, data, used_bytes, bits):
         """The message in the private copy `data`, checked (9.2), or Nonsense."""
-        if used_bytes < self.head.bytes or len(data) < self.head.bytes:
-            raise Nonsense("shorter than its head")
-        message = self.head.unpack(data, 0)
-        size = self.head.bytes
-        for _, count, record, limit in self.lists:
-            if message[count] > limit:
-                raise Nonsense(f"{count} is {message[count]}")
-            size += message[count] * record.bytes
+        cursor = Cursor(data, used_bytes)
+        message = cursor.take(self.head)[0]
+        for key, count, record, limit in self.lists:
+            demand(message[count] <= limit, f"{count} is {message[count]}")
+            message[key] = cursor.take(record, message[count])
         known = 0
         for block in self.blocks:
             known |= block.bit
             if bits & block.bit:
-                size += block.records(message) * block.record.bytes
-        # Exactly that; at least that if bits are set that are not known here (8.2-7).
-        if size > len(data) or (used_bytes < size if bits & ~known else used_bytes != size):
-            raise Nonsense(f"{used_bytes} bytes used, {size} needed")
-        at = self.head.bytes
-        for key, count, record, _ in self.lists:
-            message[key] = []
-            for _ in range(message[count]):
-                message[key].append(record.unpack(data, at))
-                at += record.bytes
-        for block in self.blocks:
-            entries = message[block.key] = []
-            for _ in range(block.records(message)):
-                if bits & block.bit:
-                    entries.append(block.record.unpack(data, at))
-                    at += block.record.bytes
-                else:
-                    entries.append({key: value[:] if isinstance(value, list) else value
-                                    for key, value in block.default.items()})
+                block.decode(message, cursor)
+            else:
+                block.leave_out(message)
+        # Nothing more follows, unless bits are set that are not known here (8.2-7).
+        demand(used_bytes == cursor.at or (bits & ~known and used_bytes > cursor.at),
+               f"{used_bytes} bytes used, {cursor.at} needed")
         if self.check:
             self.check(message)
         return message
@@ -279,11 +340,41 @@ def check_frame(m):
         normalise(p["normal"], 1e-12, math.inf, "a normal without direction")
     for s in m["surfaces"]:
         demand(s["stiffness"] >= 0 and s["damping"] >= 0, "a negative surface")
+    for f in m["frictions"]:
+        demand(f["static_friction"] >= 0 and f["dynamic_friction"] >= 0, "a negative friction")
+    for r in m["recoveries"]:
+        demand(0 <= r["recovery_s"] <= 10, "recovery_s")
+    if m["local"]:
+        check_local(m["local"])
+
+
+def check_local(local):
+    demand(is_period(local["substep_ns"]), "no substep")
+    numbers = [body["body"] for body in local["bodies"]]
+    demand(len(set(numbers)) == len(numbers), "a local body stands twice")
+    for body in local["bodies"]:
+        demand(1e-9 <= body["mass"] <= 1e9, "mass")
+        check_inertia(body["inertia"])
+        normalise(body["orientation"], 0.99 - 1e-16, 1.01 + 1e-16, "no unit quaternion")
+        for contact in body["contacts"]:
+            demand(contact["friction"] >= 0 and contact["other_inverse_mass"] >= 0, "a negative contact")
+            normalise(contact["normal"], 1e-12, math.inf, "a normal without direction")
+
+
+def check_inertia(inertia):
+    """6.2-10."""
+    trace = inertia[0] + inertia[3] + inertia[5]
+    demand(1e-18 <= trace <= 1e18, "inertia")
+    xx, xy, xz, yy, yz, zz = [component / trace for component in inertia]
+    demand(xx > 1e-12 and xx * yy - xy * xy > 1e-12 and
+           xx * (yy * zz - yz * yz) - xy * (xy * zz - xz * yz) + xz * (xy * yz - xz * yy) > 1e-12, "inertia")
 
 
 def check_haptic_health(m):
     demand(m["reason"] <= 14 and m["peer_state"] <= 5, "enumerator")
     demand(is_period(m["period_ns"]), "no period")
+    for r in m["reconciliation"]:
+        demand(r["newest_jump"] >= 0 and r["largest_jump"] >= 0, "a negative jump")
 
 
 def check_world_health(m):
@@ -297,21 +388,56 @@ def check_bodies(m):
         normalise(b["orientation"], 0.99 - 1e-16, 1.01 + 1e-16, "no unit quaternion")
 
 
+DIMENSIONS = {1: 3, 2: 1, 3: 0, 4: 2, 5: 2, 6: 3, 7: 3}  # how many of a shape's count
+
+
+def check_scene(m):
+    demand(m["revision"] >= 1 and m["needs"] & m["left_out"] == 0, "revision or needs")
+    demand(all(body["fixed"] <= 1 for body in m["bodies"]), "fixed")
+    demand(sum(body["collider_count"] for body in m["bodies"]) == m["collider_count"], "collider_count")
+    for c in m["colliders"]:
+        demand(c["shape"] in DIMENSIONS, "shape")
+        demand(all(0 <= part <= 1 for part in c["colour"]), "colour")
+        if c["shape"] == 3:
+            normalise(c["dimensions"], 1e-12, math.inf, "a half-space without direction")
+        for i in range(DIMENSIONS[c["shape"]]):
+            may_vanish = c["shape"] == 5 and i == 1
+            demand(c["dimensions"][i] > 0 or (may_vanish and c["dimensions"][i] == 0), "dimensions")
+        normalise(c["orientation"], 0.99 - 1e-16, 1.01 + 1e-16, "no unit quaternion")
+
+
+def mesh_count(m):
+    return sum(c["shape"] == 7 for c in m["colliders"])
+
+
 STILL = {"orientation": [1.0, 0.0, 0.0, 0.0], "angular_velocity": [0.0] * 3, "torque": [0.0] * 3}
 NOTHING = {"impulse": [0] * 3, "angular_impulse": [0] * 3}
 OWN_SURFACE = {"stiffness": 0.0, "damping": 0.0}
 
+NOT_MOVING, SMOOTH, OWN_RECOVERY = {"velocity": [0.0] * 3}, {"static_friction": 0.0, "dynamic_friction": 0.0}, \
+    {"recovery_s": 0.0}
+NO_JUMPS = {"frames": 0, "newest_jump": 0.0, "largest_jump": 0.0}
+NO_FILE = {"sha256": [0] * 32, "path": bytes(224)}
+
 HAPTIC_TICK = Message(1, TICK, [("pointers", "pointer_count", POINTER, 4),
                                 ("channels", "channel_count", CHANNEL, 16)],
-                      [Block(1, "rotations", "pointer_count", ROTATION, STILL),
+                      [Block(1, "rotations", "pointer_count", ROTATION, STILL, 4),
                        Block(2, "ground", None, GROUND, NOTHING)], check_tick)
 WORLD_FRAME = Message(16, FRAME, [("planes", "plane_count", PLANE, 32)],
-                      [Block(1, "surfaces", "plane_count", SURFACE, OWN_SURFACE)], check_frame)
-HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, check=check_haptic_health)
+                      [Block(1, "surfaces", "plane_count", SURFACE, OWN_SURFACE, 32),
+                       Block(2, "velocities", "plane_count", VELOCITY, NOT_MOVING, 32),
+                       Block(4, "frictions", "plane_count", FRICTION, SMOOTH, 32),
+                       Block(8, "recoveries", "plane_count", RECOVERY, OWN_RECOVERY, 32),
+                       LocalBlock()], check_frame, version=2)
+HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, (), [Block(1, "reconciliation", None, RECONCILIATION, NO_JUMPS)],
+                                check_haptic_health, version=2)
 WORLD_HEALTH_MESSAGE = Message(17, WORLD_HEALTH, check=check_world_health)
 WORLD_BODIES = Message(18, BODIES, [("bodies", "body_count", BODY, 10000)], check=check_bodies)
+WORLD_SCENE = Message(19, SCENE, [("bodies", "body_count", SCENE_BODY, 10000),
+                                  ("colliders", "collider_count", COLLIDER, 20000)],
+                      [Block(1, "meshes", mesh_count, MESH, NO_FILE)], check_scene)
 MESSAGES = {m.type_id: m for m in (HAPTIC_TICK, HAPTIC_HEALTH_MESSAGE, WORLD_FRAME, WORLD_HEALTH_MESSAGE,
-                                   WORLD_BODIES)}
+                                   WORLD_BODIES, WORLD_SCENE)}
 
 # ------------------------------------------------------------------------------------------------------
 # Section 4: the ring
@@ -382,7 +508,7 @@ class Reader:
             return None
         now = now_ns()
         if self.entry.period_ns and self.seen:  # 9.2-9
-            most = 4 * (now - self.seen_ns) // self.entry.period_ns + self.entry.slot_count
+            most = 4 * ((now - self.seen_ns) // self.entry.period_ns + self.entry.slot_count)
             if number - self.seen > most:
                 self.backwards = True
                 return None
@@ -511,7 +637,7 @@ class OwnSegment:
         ring = HEADER_BYTES + LINE * len(streams)
         for i, (message, payload_bytes, slot_count, period_ns) in enumerate(streams):
             stride = round_up(payload_bytes + 32, LINE)
-            entries.append(Entry((message.type_id, 1, 0, HEADER_BYTES + LINE * i, ring, stride, slot_count,
+            entries.append(Entry((message.type_id, message.version, 0, HEADER_BYTES + LINE * i, ring, stride, slot_count,
                                   payload_bytes, 0, period_ns, 0, 0)))
             ring += stride * slot_count
         size = round_up(ring, 4096)
@@ -1020,6 +1146,16 @@ class World:
                                "feature": feature, "point": point, "normal": normal})
         return planes
 
+    def scene(self):
+        """6.5; needs: moving bodies, drag."""
+        needs = (1 if self.mass > 0 else 0) | (16 if self.mass > 0 and self.drag > 0 else 0)
+        return WORLD_SCENE.new(
+            revision=1 + self.resets, needs=needs, left_out=255 & ~needs, name=b"peer.py",
+            bodies=[{"body": 0, "generation": self.generation, "fixed": int(self.mass == 0),
+                     "collider_count": 1, "name": b"box"}],
+            colliders=[{"shape": 1, "reserved": 0, "dimensions": [HALF_EXTENT] * 3, "position": [0.0] * 3,
+                        "orientation": [1.0, 0.0, 0.0, 0.0], "colour": [0.8, 0.5, 0.2, 1.0]}])
+
     def body(self):
         return {"body": 0, "generation": self.generation, "mass": self.mass, "position": self.position,
                 "orientation": [1.0, 0.0, 0.0, 0.0], "velocity": [self.velocity, 0.0, 0.0],
@@ -1031,10 +1167,12 @@ def run_world(arguments):
     dt = period_ns * 1e-9
     world = World(arguments.target, arguments.mass, arguments.drag)
     own = OwnSegment(arguments.instance, WORLD,
-                     [(WORLD_FRAME, WORLD_FRAME.largest(), 8, period_ns),
+                     [(WORLD_FRAME, 16384 - 32, 8, period_ns),  # 6.2-2
                       (WORLD_HEALTH_MESSAGE, WORLD_HEALTH.bytes, 4, 250_000_000),
-                      (WORLD_BODIES, BODIES.bytes + BODY.bytes, 4, period_ns)])
-    frames, healths, bodies = own.writers
+                      (WORLD_BODIES, BODIES.bytes + BODY.bytes, 4, period_ns),
+                      (WORLD_SCENE, SCENE.bytes + SCENE_BODY.bytes + COLLIDER.bytes, 4, 0)])
+    frames, healths, bodies, scenes = own.writers
+    scenes.publish(world.scene())
     ledger = LedgerReader(own.epoch, FORCE_CAP * max(0.1, 3 * dt))
     link = Link(arguments.instance, HAPTIC, [HAPTIC_TICK])
     reader, tick, tick_ns, fresh_ticks = None, None, 0, 0
@@ -1045,9 +1183,13 @@ def run_world(arguments):
         (f"a block of {world.mass:g} kg" if world.mass else "a fixed box") + f", epoch {own.epoch}")
 
     def drain():
-        """Every tick that was published and not read yet."""
+        """Every tick that was published and not read yet, within half a period: whoever floods is lapped, which
+        loses nothing (7.4-1). Whether nothing is left."""
         nonlocal tick, tick_ns, fresh_ticks
+        end_ns = now_ns() + period_ns // 2
         while reader is not None and not reader.hopeless():
+            if now_ns() > end_ns:
+                return False
             status = reader.next()
             if status == FRESH:
                 if ledger.epoch != reader.view.epoch:
@@ -1058,13 +1200,18 @@ def run_world(arguments):
                 break
         if reader is not None and reader.hopeless() and not reader.view.gone:
             link.refuse(reader.view, reader.why or "its counter runs backwards")
+        return True
 
+    offered = None
     while not stop:
         now = schedule.wait()
-        offered = link.take()  # first: whose old segment is frozen, is then read to its end (5.3-5)
-        drain()
+        if offered is None:
+            offered = link.take()  # first: the old segment, frozen then, is read to its end (5.3-5)
+        drained = drain()
         impulses = ledger.take()
         world.step(impulses, dt)
+        if scenes.published <= world.resets:
+            scenes.publish(world.scene())
         frame += 1
         age_ns = now_ns() - tick_ns
         period_T = tick["period_ns"] if tick else 0
@@ -1093,10 +1240,11 @@ def run_world(arguments):
                 peer_epoch=reader.view.epoch if reader else 0, applied=ledger.life_applied,
                 moving_bodies=int(world.mass > 0), resets=world.resets,
                 scene=b"peer.py block" if world.mass else b"peer.py box", **discarded, **schedule.health()))
-        if offered is not None:  # only now: the old segment's end is acknowledged
+        if offered is not None and drained:  # only now: the old segment's end is acknowledged
             if reader is not None:
                 reader.view.close()
             totals, reader, tick, fresh_ticks = counts, Reader(offered, HAPTIC_TICK), None, 0
+            offered = None
         schedule.duration.note(now_ns() - now)
     own.close()
     link.stop()
@@ -1292,13 +1440,18 @@ class PeerWatch:
     LONGEST_PERIOD_NS = 200_000_000
 
     def __init__(self):
+        self.stated_period_ns = self.LONGEST_PERIOD_NS  # of the newest frame of any world
         self.forget()
 
     def forget(self):
         self.state, self.fresh, self.frame_ns, self.period_ns = ABSENT, 0, 0, self.LONGEST_PERIOD_NS
 
     def lost_after(self):
-        return max(5 * self.period_ns, 250_000_000)
+        return self.lost_after_period(self.period_ns)
+
+    @staticmethod
+    def lost_after_period(period_ns):
+        return max(5 * period_ns, 250_000_000)
 
     def update(self, now, view, frame, force_is_zero):
         alive = view is not None and view.ready() and now - view.heartbeat_ns() <= self.lost_after()
@@ -1322,7 +1475,7 @@ class PeerWatch:
                 self.fresh = 0
         if frame is not None and self.state != ABSENT:
             self.frame_ns = now
-            self.period_ns = min(frame["period_ns"], self.LONGEST_PERIOD_NS)
+            self.period_ns = self.stated_period_ns = min(frame["period_ns"], self.LONGEST_PERIOD_NS)
             self.fresh += 1
             if self.state == WAITING and self.fresh >= 3:  # 5.5-3
                 self.state = LIVE
@@ -1411,6 +1564,7 @@ class HapticSide:
         self.finger, self.surfaces, self.watch = Finger(target), Surfaces(), PeerWatch()
         self.ledger, self.safety = Ledger(own.epoch, self.period), Safety(self.period)
         self.reader = None
+        self.newest_frame = 0  # number of the newest frame of this reader
         self.shown_epoch = self.shown_frame = self.channel_epoch = 0
         self.start_ns, self.tick, self.reason, self.reason_ticks = 0, 0, WORLD_ABSENT, 0
         self.largest_force = self.largest_step = 0.0
@@ -1425,14 +1579,15 @@ class HapticSide:
                 self.retries += self.reader.retries
                 self.rejected += self.reader.rejected
                 self.reader.view.close()
-            self.reader = Reader(offered, WORLD_FRAME)
+            self.reader, self.newest_frame = Reader(offered, WORLD_FRAME), 0
         if self.reader is None:
             return None
         status = self.reader.latest()
         if self.reader.hopeless() and not self.reader.view.gone:
             link.refuse(self.reader.view, self.reader.why or "its counter runs backwards")
-        if status != FRESH:
+        if status != FRESH or self.reader.value["frame"] <= self.newest_frame:  # 6.2-3
             return None
+        self.newest_frame = self.reader.value["frame"]
         self.ledger.receive(self.reader.view.epoch, self.reader.value)
         return self.reader.value
 
@@ -1502,8 +1657,8 @@ class HapticSide:
             reason=self.reason, peer_state=state,
             peer_epoch=self.reader.view.epoch if self.reader and watch.state != ABSENT else 0,
             feature_age_ns=max(0, now - watch.frame_ns) if self.shown_epoch else 0,
-            zero_force_after_ns=watch.lost_after() + round((FADE + CAP / SLEW_LIMIT) * 1e9) +
-            3 * self.period_ns, largest_force=self.largest_force, largest_force_step=self.largest_step,
+            zero_force_after_ns=watch.lost_after_period(watch.stated_period_ns) +
+            round((FADE + CAP / SLEW_LIMIT) * 1e9) + 3 * self.period_ns, largest_force=self.largest_force, largest_force_step=self.largest_step,
             slew_limit=SLEW_LIMIT, target=self.finger.wanted(), device=b"peer.py",
             **{f"books.{name}": units for name, units in self.ledger.books.items()}, **schedule.health()))
 
@@ -1519,7 +1674,7 @@ def run_haptic(arguments):
     slots = 4 * (PeerWatch.LONGEST_PERIOD_NS + period_ns) // period_ns  # 6.1
     own = OwnSegment(arguments.instance, HAPTIC,
                      [(HAPTIC_TICK, HAPTIC_TICK.largest(), 1 << max(2, (slots - 1).bit_length()), period_ns),
-                      (HAPTIC_HEALTH_MESSAGE, HAPTIC_HEALTH.bytes, 4, 100_000_000)])
+                      (HAPTIC_HEALTH_MESSAGE, HAPTIC_HEALTH_MESSAGE.largest(), 4, 100_000_000)])
     side = HapticSide(own, period_ns, arguments.target)
     link = Link(arguments.instance, WORLD, [WORLD_FRAME])
     schedule, stop = Schedule(period_ns), Stop(arguments.seconds)

@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <thread>
@@ -22,27 +23,20 @@ using protocol::Role;
 constexpr double kDaemonSlewLimit = 5000;  // N/s, set below, whatever the shipped file says
 constexpr double kUnit = protocol::kImpulseUnit;
 
-/// An instance of its own, whose segments go with it: a killed owner leaves them behind.
-struct Instance {
-  std::string name = FreshInstance();
-  ~Instance() {
-    for (const char* role : {".haptic", ".world"}) {
-      std::filesystem::remove("/dev/shm/rikiseki." + name + role);
-    }
-  }
-};
-
 std::vector<std::string> Peer(const std::string& side, const std::string& instance,
                               const std::vector<std::string>& more = {}) {
-  std::vector<std::string> command{"/usr/bin/python3", SourceFile("scripts/peer.py"), side, "--instance",
-                                   instance};
+  std::vector<std::string> command{"/usr/bin/python3", SourceFile("scripts/peer.py"), side,
+                                   "--instance", instance};
   command.insert(command.end(), more.begin(), more.end());
   return command;
 }
 
 std::vector<std::string> HapticServer(const std::string& instance) {
-  return {Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"),
-          "--instance", instance, "--set", "safety.slew_limit_n_per_s=5000"};
+  return {
+      Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"), "--instance",
+      instance, "--set", "safety.slew_limit_n_per_s=5000",
+      // A longer stroke pushes through a box that does not yield: the cap is below what the hand can.
+      "--set", "hand.stroke_mm=20 0 0"};
 }
 
 std::vector<std::string> WorldServer(const std::string& instance) {
@@ -83,19 +77,19 @@ bool WaitForPush(const TickWatch& watch) {
 }
 
 bool WaitForRelease(const TickWatch& watch) {
-  return Eventually([&] { return watch.Latest().force == 0; }, 15);
+  return Eventually([&] { return watch.Latest().force < 1e-12; }, 15);
 }
 
 }  // namespace
 
 TEST_CASE("peer.py world holds haptic_server in contact with its box, and its books balance") {
   const Instance instance;
-  Child world(Peer("world", instance.name));
-  Child haptic(HapticServer(instance.name));
+  Child world(Peer("world", instance));
+  Child haptic(HapticServer(instance));
   {
-    TickWatch watch(instance.name, kDaemonSlewLimit);
-    const auto haptic_view = Observe(instance.name, Role::kHaptic);
-    const auto world_view = Observe(instance.name, Role::kWorld);
+    TickWatch watch(instance, kDaemonSlewLimit);
+    const auto haptic_view = Observe(instance, Role::kHaptic);
+    const auto world_view = Observe(instance, Role::kWorld);
     REQUIRE(WaitForPush(watch));
     CHECK(ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive);
     REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
@@ -117,11 +111,11 @@ TEST_CASE("peer.py world holds haptic_server in contact with its box, and its bo
 
 TEST_CASE("peer.py world gives its block exactly the momentum that haptic_server displayed") {
   const Instance instance;
-  Child world(Peer("world", instance.name, {"--mass", "1.5", "--drag", "0"}));
-  Child haptic(HapticServer(instance.name));
-  TickWatch watch(instance.name, kDaemonSlewLimit);
-  const auto haptic_view = Observe(instance.name, Role::kHaptic);
-  const auto world_view = Observe(instance.name, Role::kWorld);
+  Child world(Peer("world", instance, {"--mass", "1.5", "--drag", "0"}));
+  Child haptic(HapticServer(instance));
+  TickWatch watch(instance, kDaemonSlewLimit);
+  const auto haptic_view = Observe(instance, Role::kHaptic);
+  const auto world_view = Observe(instance, Role::kWorld);
   REQUIRE(WaitForPush(watch));
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
   const protocol::Books books = SettledBooks(*haptic_view);
@@ -135,12 +129,13 @@ TEST_CASE("peer.py world gives its block exactly the momentum that haptic_server
   CheckSafe(watch);
 }
 
-TEST_CASE("peer.py world killed in contact: the force goes to zero in time, and the next one couples") {
+TEST_CASE(
+    "peer.py world killed in contact: the force goes to zero in time, and the next one couples") {
   const Instance instance;
-  Child haptic(HapticServer(instance.name));
-  std::optional<Child> world(std::in_place, Peer("world", instance.name));
-  TickWatch watch(instance.name, kDaemonSlewLimit);
-  const auto haptic_view = Observe(instance.name, Role::kHaptic);
+  Child haptic(HapticServer(instance));
+  std::optional<Child> world(std::in_place, Peer("world", instance));
+  TickWatch watch(instance, kDaemonSlewLimit);
+  const auto haptic_view = Observe(instance, Role::kHaptic);
   REQUIRE(WaitForPush(watch));
   world->Signal(SIGKILL);
   world->Wait();
@@ -148,7 +143,7 @@ TEST_CASE("peer.py world killed in contact: the force goes to zero in time, and 
       std::chrono::nanoseconds(ReadHapticHealth(*haptic_view).zero_force_after_ns));
   CHECK(Eventually([&] { return watch.Latest().force < 1e-12; }, 0.5));
 
-  world.emplace(Peer("world", instance.name));
+  world.emplace(Peer("world", instance));
   REQUIRE(WaitForPush(watch));
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
   CHECK(Norm(SettledBooks(*haptic_view).peer_lost) > 0);
@@ -157,14 +152,14 @@ TEST_CASE("peer.py world killed in contact: the force goes to zero in time, and 
 
 TEST_CASE("peer.py haptic pushes the block of world_server: applied + discarded = displayed") {
   const Instance instance;
-  Child world(WorldServer(instance.name));
-  const auto world_view = Observe(instance.name, Role::kWorld);
+  Child world(WorldServer(instance));
+  const auto world_view = Observe(instance, Role::kWorld);
   protocol::WorldFrame frame;
   {
-    Child haptic(Peer("haptic", instance.name));
-    const auto haptic_view = Observe(instance.name, Role::kHaptic);
+    Child haptic(Peer("haptic", instance));
+    const auto haptic_view = Observe(instance, Role::kHaptic);
     const double slew_limit = ReadHapticHealth(*haptic_view).slew_limit;
-    TickWatch watch(instance.name, slew_limit);
+    TickWatch watch(instance, slew_limit);
     const double start = ReadMovingBody(*world_view).position[0];
     REQUIRE(WaitForPush(watch));
     CHECK(ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive);
@@ -194,10 +189,10 @@ TEST_CASE("peer.py haptic pushes the block of world_server: applied + discarded 
     CheckSafe(watch);
   }
   world.Signal(SIGHUP);
-  Child second(Peer("haptic", instance.name));
-  const auto haptic_view = Observe(instance.name, Role::kHaptic);
+  Child second(Peer("haptic", instance));
+  const auto haptic_view = Observe(instance, Role::kHaptic);
   CHECK(haptic_view->epoch() > frame.acked_epoch);
-  TickWatch watch(instance.name, ReadHapticHealth(*haptic_view).slew_limit);
+  TickWatch watch(instance, ReadHapticHealth(*haptic_view).slew_limit);
   REQUIRE(WaitForPush(watch));
   REQUIRE(WaitForRelease(watch));
   SettledBooks(*haptic_view);
@@ -211,16 +206,16 @@ TEST_CASE("peer.py haptic pushes the block of world_server: applied + discarded 
 
 TEST_CASE("both sides in Python: contact, exact books, a restart of each") {
   const Instance instance;
-  std::optional<Child> haptic(std::in_place, Peer("haptic", instance.name));
-  std::optional<Child> world(std::in_place, Peer("world", instance.name, {"--mass", "2"}));
+  std::optional<Child> haptic(std::in_place, Peer("haptic", instance));
+  std::optional<Child> world(std::in_place, Peer("world", instance, {"--mass", "2"}));
   {
-    const auto haptic_view = Observe(instance.name, Role::kHaptic);
-    TickWatch watch(instance.name, ReadHapticHealth(*haptic_view).slew_limit);
+    const auto haptic_view = Observe(instance, Role::kHaptic);
+    TickWatch watch(instance, ReadHapticHealth(*haptic_view).slew_limit);
     REQUIRE(WaitForPush(watch));
     world->Signal(SIGKILL);
     world->Wait();
     CHECK(Eventually([&] { return watch.Latest().force == 0; }, 1));
-    world.emplace(Peer("world", instance.name, {"--mass", "2"}));
+    world.emplace(Peer("world", instance, {"--mass", "2"}));
     REQUIRE(WaitForPush(watch));
     REQUIRE(WaitForRelease(watch));
     const protocol::Books books = SettledBooks(*haptic_view);
@@ -230,10 +225,10 @@ TEST_CASE("both sides in Python: contact, exact books, a restart of each") {
     haptic->Signal(SIGKILL);
     haptic->Wait();
   }
-  const auto world_view = Observe(instance.name, Role::kWorld);
-  haptic.emplace(Peer("haptic", instance.name));
-  const auto haptic_view = Observe(instance.name, Role::kHaptic);
-  TickWatch watch(instance.name, ReadHapticHealth(*haptic_view).slew_limit);
+  const auto world_view = Observe(instance, Role::kWorld);
+  haptic.emplace(Peer("haptic", instance));
+  const auto haptic_view = Observe(instance, Role::kHaptic);
+  TickWatch watch(instance, ReadHapticHealth(*haptic_view).slew_limit);
   REQUIRE(WaitForPush(watch));
   REQUIRE(WaitForRelease(watch));
   SettledBooks(*haptic_view);
@@ -241,17 +236,57 @@ TEST_CASE("both sides in Python: contact, exact books, a restart of each") {
   CHECK(block.mass * std::abs(block.velocity[0]) <= Norm(ReadWorldHealth(*world_view).applied));
 }
 
+TEST_CASE("a world of a page of C on rikiseki.h holds haptic_server and peer.py in contact") {
+  const bool python = GENERATE(false, true);
+  const Instance instance;
+  std::optional<Child> world(std::in_place,
+                             std::vector<std::string>{Program("rikiseki_h_world"), instance});
+  std::optional<Child> haptic(std::in_place,
+                              python ? Peer("haptic", instance) : HapticServer(instance));
+  const auto haptic_view = Observe(instance, Role::kHaptic);
+  TickWatch watch(instance, ReadHapticHealth(*haptic_view).slew_limit);
+  REQUIRE(WaitForPush(watch));
+  world->Signal(SIGKILL);
+  world->Wait();
+  CHECK(Eventually([&] { return watch.Latest().force < 1e-12; }, 1));
+  world.emplace(std::vector<std::string>{Program("rikiseki_h_world"), instance});
+  REQUIRE(WaitForPush(watch));
+  REQUIRE(WaitForRelease(watch));
+  const protocol::Books books = SettledBooks(*haptic_view);
+  CHECK(Norm(books.discarded) > 0);
+  CHECK(Norm(books.applied) == 0);
+  CheckSafe(watch);
+  world->Signal(SIGTERM);
+  CHECK(world->Wait() == 0);
+}
+
+// conformance_test.cpp has peer.py judged. Without RIKISEKI_FULL, what goes wrong most easily: the sums, nonsense,
+// restarts. Not strict: a page of C publishes no streams for observers.
+TEST_CASE("the world in C passes protocol_check") {
+  const Instance instance;
+  Child world({Program("rikiseki_h_world"), instance});
+  std::vector<std::string> kit{Program("protocol_check"), "--as", "haptic", "--instance", instance};
+  if (std::getenv("RIKISEKI_FULL") == nullptr) {
+    for (const char* id : {"world/7.5-1", "world/7.4-2", "world/7.4-7", "world/9.2-3"}) {
+      kit.insert(kit.end(), {"--case", id});
+    }
+  }
+  CHECK(Child(kit).Wait(120) == 0);
+  world.Signal(SIGTERM);
+  CHECK(world.Wait() == 0);
+}
+
 TEST_CASE("peer.py ends with the statuses of SPEC.md 5.2") {
   const Instance instance;
-  Child first(Peer("world", instance.name));
-  const auto view = Observe(instance.name, Role::kWorld);
-  CHECK(Child(Peer("world", instance.name)).Wait() == 75);
-  CHECK(Child(WorldServer(instance.name)).Wait() == 75);  // and a daemon does not take it from peer.py
+  Child first(Peer("world", instance));
+  const auto view = Observe(instance, Role::kWorld);
+  CHECK(Child(Peer("world", instance)).Wait() == 75);
+  CHECK(Child(WorldServer(instance)).Wait() == 75);  // and a daemon does not take it from peer.py
   CHECK(Child(Peer("haptic", "no/name")).Wait() == 64);
-  CHECK(Child(Peer("haptic", instance.name, {"--rate", "0"})).Wait() == 64);
+  CHECK(Child(Peer("haptic", instance, {"--rate", "0"})).Wait() == 64);
   CHECK(view->Ready());
   first.Signal(SIGTERM);
   CHECK(first.Wait() == 0);
   CHECK(view->State() == protocol::SegmentState::kClosed);
-  CHECK_FALSE(std::filesystem::exists("/dev/shm/rikiseki." + instance.name + ".world"));
+  CHECK_FALSE(std::filesystem::exists("/dev/shm/rikiseki." + std::string(instance) + ".world"));
 }

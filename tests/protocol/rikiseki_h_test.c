@@ -1,14 +1,11 @@
 /* The C half of rikiseki_h_test: rikiseki.h compiled as C11. */
-#include "protocol/rikiseki.h"  /* first: it asks for _GNU_SOURCE */
-
 #include "tests/protocol/rikiseki_h_test.h"
-
 
 /* Every field that travels, in the order of layout.golden.txt, with the offset that this compiler gives it. */
 #define FIELD(record, type, field, kind) \
-  {record "." #field ":" kind, offsetof(type, field), sizeof(((type *)0)->field)}
+  { record "." #field ":" kind, offsetof(type, field), sizeof(((type*)0)->field) }
 static const struct {
-  const char *name;
+  const char* name;
   size_t offset, bytes;
 } kFields[] = {
     FIELD("segment_header", rk_segment_header, magic, "u64"),
@@ -106,6 +103,9 @@ static const struct {
     FIELD("haptic.health", rk_haptic_health, device, "char[32]"),
     FIELD("haptic.health", rk_haptic_health, lateness, "u64[256]"),
     FIELD("haptic.health", rk_haptic_health, duration, "u64[256]"),
+    FIELD("haptic.health/reconciliation", rk_reconciliation, frames, "u64"),
+    FIELD("haptic.health/reconciliation", rk_reconciliation, newest_jump, "f64"),
+    FIELD("haptic.health/reconciliation", rk_reconciliation, largest_jump, "f64"),
     FIELD("world.frame", rk_frame_head, frame, "u64"),
     FIELD("world.frame", rk_frame_head, world_time_ns, "u64"),
     FIELD("world.frame", rk_frame_head, period_ns, "u64"),
@@ -124,6 +124,34 @@ static const struct {
     FIELD("world.frame/plane", rk_plane, normal, "f64[3]"),
     FIELD("world.frame/plane_surface", rk_plane_surface, stiffness, "f64"),
     FIELD("world.frame/plane_surface", rk_plane_surface, damping, "f64"),
+    FIELD("world.frame/plane_velocity", rk_plane_velocity, velocity, "f64[3]"),
+    FIELD("world.frame/plane_friction", rk_plane_friction, static_friction, "f64"),
+    FIELD("world.frame/plane_friction", rk_plane_friction, dynamic_friction, "f64"),
+    FIELD("world.frame/plane_recovery", rk_plane_recovery, recovery_s, "f64"),
+    FIELD("world.frame/local", rk_local_head, local_body_count, "u32"),
+    FIELD("world.frame/local", rk_local_head, reserved, "u32"),
+    FIELD("world.frame/local", rk_local_head, substep_ns, "u64"),
+    FIELD("world.frame/local_body", rk_local_body, body, "u32"),
+    FIELD("world.frame/local_body", rk_local_body, generation, "u32"),
+    FIELD("world.frame/local_body", rk_local_body, contact_count, "u32"),
+    FIELD("world.frame/local_body", rk_local_body, reserved, "u32"),
+    FIELD("world.frame/local_body", rk_local_body, mass, "f64"),
+    FIELD("world.frame/local_body", rk_local_body, inertia, "f64[6]"),
+    FIELD("world.frame/local_body", rk_local_body, position, "f64[3]"),
+    FIELD("world.frame/local_body", rk_local_body, orientation, "f64[4]"),
+    FIELD("world.frame/local_body", rk_local_body, velocity, "f64[3]"),
+    FIELD("world.frame/local_body", rk_local_body, angular_velocity, "f64[3]"),
+    FIELD("world.frame/local_body", rk_local_body, acceleration, "f64[3]"),
+    FIELD("world.frame/local_body", rk_local_body, angular_acceleration, "f64[3]"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, other_body, "u32"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, other_generation, "u32"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, point, "f64[3]"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, normal, "f64[3]"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, gap, "f64"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, friction, "f64"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, other_velocity, "f64[3]"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, other_inverse_mass, "f64"),
+    FIELD("world.frame/contact_plane", rk_contact_plane, impulse, "f64[3]"),
     FIELD("world.health", rk_world_health, frames, "u64"),
     FIELD("world.health", rk_world_health, period_ns, "u64"),
     FIELD("world.health", rk_world_health, missed, "u64"),
@@ -155,9 +183,29 @@ static const struct {
     FIELD("world.bodies/body", rk_body, orientation, "f64[4]"),
     FIELD("world.bodies/body", rk_body, velocity, "f64[3]"),
     FIELD("world.bodies/body", rk_body, angular_velocity, "f64[3]"),
+    FIELD("world.scene", rk_scene_head, revision, "u64"),
+    FIELD("world.scene", rk_scene_head, needs, "u64"),
+    FIELD("world.scene", rk_scene_head, left_out, "u64"),
+    FIELD("world.scene", rk_scene_head, gravity, "f64[3]"),
+    FIELD("world.scene", rk_scene_head, name, "char[64]"),
+    FIELD("world.scene", rk_scene_head, body_count, "u32"),
+    FIELD("world.scene", rk_scene_head, collider_count, "u32"),
+    FIELD("world.scene/body", rk_scene_body, body, "u32"),
+    FIELD("world.scene/body", rk_scene_body, generation, "u32"),
+    FIELD("world.scene/body", rk_scene_body, fixed, "u32"),
+    FIELD("world.scene/body", rk_scene_body, collider_count, "u32"),
+    FIELD("world.scene/body", rk_scene_body, name, "char[64]"),
+    FIELD("world.scene/collider", rk_scene_collider, shape, "u32"),
+    FIELD("world.scene/collider", rk_scene_collider, reserved, "u32"),
+    FIELD("world.scene/collider", rk_scene_collider, dimensions, "f64[3]"),
+    FIELD("world.scene/collider", rk_scene_collider, position, "f64[3]"),
+    FIELD("world.scene/collider", rk_scene_collider, orientation, "f64[4]"),
+    FIELD("world.scene/collider", rk_scene_collider, colour, "f64[4]"),
+    FIELD("world.scene/mesh", rk_scene_mesh, sha256, "u8[32]"),
+    FIELD("world.scene/mesh", rk_scene_mesh, path, "char[224]"),
 };
 
-size_t rk_test_layout(char *text, size_t room) {
+size_t rk_test_layout(char* text, size_t room) {
   size_t at = 0;
   for (size_t i = 0; i < sizeof kFields / sizeof kFields[0]; ++i) {
     at += (size_t)snprintf(text + at, room - at, "%s:%zu:%zu\n", kFields[i].name, kFields[i].offset,
@@ -166,8 +214,8 @@ size_t rk_test_layout(char *text, size_t room) {
   return at;
 }
 
-int rk_test_recode(uint32_t type, const uint64_t *words, size_t bytes, uint32_t used, uint32_t blocks,
-                   uint64_t *again, uint32_t *again_used, uint32_t *again_blocks) {
+int rk_test_recode(uint32_t type, const uint64_t* words, size_t bytes, uint32_t used,
+                   uint32_t blocks, uint64_t* again, uint32_t* again_used, uint32_t* again_blocks) {
   static rk_tick tick;
   static rk_frame frame;
   rk_received shape;
@@ -194,9 +242,9 @@ struct rk_test_segment {
   rk_writer ticks;
 };
 
-int rk_test_attach(const char *instance, uint32_t role, struct rk_test_view **out, char why[256]) {
+int rk_test_attach(const char* instance, uint32_t role, struct rk_test_view** out, char why[256]) {
   static const rk_need need = {RK_HAPTIC_TICK, 1, 0};
-  struct rk_test_view *view = (struct rk_test_view *)calloc(1, sizeof *view);
+  struct rk_test_view* view = (struct rk_test_view*)calloc(1, sizeof *view);
   const int status = (int)rk_attach(&view->view, instance, role, &need, role == RK_HAPTIC ? 1 : 0);
   snprintf(why, 256, "%s", view->view.why);
   *out = NULL;
@@ -209,15 +257,27 @@ int rk_test_attach(const char *instance, uint32_t role, struct rk_test_view **ou
   return status;
 }
 
-uint64_t rk_test_epoch(const struct rk_test_view *view) { return view->view.header.epoch; }
-uint64_t rk_test_state(const struct rk_test_view *view) { return rk_state(&view->view); }
-uint64_t rk_test_heartbeat(const struct rk_test_view *view) { return rk_heartbeat_of(&view->view); }
-int rk_test_alive(const struct rk_test_view *view) { return rk_owner_alive(&view->view); }
-int rk_test_replaced(const struct rk_test_view *view) { return rk_replaced(&view->view); }
-uint64_t rk_test_lost(const struct rk_test_view *view) { return view->ticks.lost; }
+uint64_t rk_test_epoch(const struct rk_test_view* view) {
+  return view->view.header.epoch;
+}
+uint64_t rk_test_state(const struct rk_test_view* view) {
+  return rk_state(&view->view);
+}
+uint64_t rk_test_heartbeat(const struct rk_test_view* view) {
+  return rk_heartbeat_of(&view->view);
+}
+int rk_test_alive(const struct rk_test_view* view) {
+  return rk_owner_alive(&view->view);
+}
+int rk_test_replaced(const struct rk_test_view* view) {
+  return rk_replaced(&view->view);
+}
+uint64_t rk_test_lost(const struct rk_test_view* view) {
+  return view->ticks.lost;
+}
 
-int rk_test_read(struct rk_test_view *view, int next, uint64_t *words, size_t bytes, uint64_t *number,
-                 uint64_t *stamp_ns, uint32_t *used, uint32_t *blocks) {
+int rk_test_read(struct rk_test_view* view, int next, uint64_t* words, size_t bytes,
+                 uint64_t* number, uint64_t* stamp_ns, uint32_t* used, uint32_t* blocks) {
   rk_received received;
   enum rk_read_status status;
   memset(&received, 0, sizeof received);
@@ -230,15 +290,16 @@ int rk_test_read(struct rk_test_view *view, int next, uint64_t *words, size_t by
   return (int)status;
 }
 
-void rk_test_detach(struct rk_test_view *view) {
+void rk_test_detach(struct rk_test_view* view) {
   rk_detach(&view->view);
   free(view);
 }
 
-int rk_test_create(const char *instance, struct rk_test_segment **out, char why[256]) {
-  static const rk_stream_spec streams[2] = {{RK_HAPTIC_TICK, RK_TICK_BYTES, 16, 1000000},
-                                            {RK_HAPTIC_HEALTH, sizeof(rk_haptic_health), 4, 100000000}};
-  struct rk_test_segment *own = (struct rk_test_segment *)calloc(1, sizeof *own);
+int rk_test_create(const char* instance, struct rk_test_segment** out, char why[256]) {
+  static const rk_stream_spec streams[2] = {
+      {RK_HAPTIC_TICK, RK_TICK_BYTES, 16, 1000000},
+      {RK_HAPTIC_HEALTH, RK_HAPTIC_HEALTH_BYTES, 4, 100000000}};
+  struct rk_test_segment* own = (struct rk_test_segment*)calloc(1, sizeof *own);
   const int status = rk_create(&own->segment, instance, RK_HAPTIC, streams, 2, "rikiseki_h_test");
   snprintf(why, 256, "%s", own->segment.why);
   *out = own;
@@ -251,8 +312,8 @@ int rk_test_create(const char *instance, struct rk_test_segment **out, char why[
   return status;
 }
 
-int rk_test_publish(struct rk_test_segment *own, const uint64_t *words, uint32_t used, uint32_t blocks,
-                    uint64_t stamp_ns) {
+int rk_test_publish(struct rk_test_segment* own, const uint64_t* words, uint32_t used,
+                    uint32_t blocks, uint64_t stamp_ns) {
   rk_received shape;
   memset(&shape, 0, sizeof shape);
   shape.used_bytes = used;
@@ -261,16 +322,16 @@ int rk_test_publish(struct rk_test_segment *own, const uint64_t *words, uint32_t
   return rk_publish(&own->ticks, words, &shape, stamp_ns);
 }
 
-uint64_t rk_test_own_state(const struct rk_test_segment *own) {
+uint64_t rk_test_own_state(const struct rk_test_segment* own) {
   return __atomic_load_n(&own->segment.header->state, __ATOMIC_ACQUIRE);
 }
 
-void rk_test_close(struct rk_test_segment *own) {
+void rk_test_close(struct rk_test_segment* own) {
   rk_close(&own->segment);
   free(own);
 }
 
-void rk_test_die(struct rk_test_segment *own) {
+void rk_test_die(struct rk_test_segment* own) {
   struct flock lock = rk_lock_on_byte_0(F_UNLCK);
   fcntl(own->segment.descriptor, F_OFD_SETLK, &lock); /* the map alone would keep it */
   close(own->segment.descriptor);

@@ -2,9 +2,9 @@
  * to start from, and a test: peer_test.cpp holds haptic_server in contact with it.
  *
  *   rikiseki_h_world [instance]         until SIGTERM */
-#include "protocol/rikiseki.h"
-
 #include <signal.h>
+
+#include "protocol/rikiseki.h"
 
 static const double kHalfExtent = 0.03;               /* m */
 static const uint64_t kPeriodNs = UINT64_C(50000000); /* 20 Hz */
@@ -15,23 +15,24 @@ static void stop(int number) {
   stopping = 1;
 }
 
-static int same_channel(const rk_channel *a, const rk_channel *b) {
+static int same_channel(const rk_channel* a, const rk_channel* b) {
   return a->body == b->body && a->generation == b->generation && a->pointer == b->pointer &&
          a->opened_tick == b->opened_tick;
 }
 
-/* 7.4: takes differences of totals. Nothing here can move, so all of it is discarded, and declared. */
-static void consume(rk_frame *frame, const rk_tick *tick, const rk_tick *before, uint64_t epoch) {
-  if (frame->head.acked_epoch == epoch && tick->head.tick <= before->head.tick) return;
+/* 7.4: takes differences of totals. Nothing here can move, so all of it is discarded, and declared. 0 if the
+ * tick is an old one. */
+static int consume(rk_frame* frame, const rk_tick* tick, const rk_tick* before, uint64_t epoch) {
+  if (frame->head.acked_epoch == epoch && tick->head.tick <= before->head.tick) return 0;
   if (frame->head.acked_epoch != epoch) { /* a new haptic side: a baseline, nothing more */
     memset(frame->head.applied, 0, sizeof frame->head.applied);
     memset(frame->head.discarded, 0, sizeof frame->head.discarded);
     frame->head.acked_epoch = epoch;
     frame->head.acked_tick = frame->head.baseline_tick = tick->head.tick;
-    return;
+    return 1;
   }
   for (uint32_t i = 0; i < tick->head.channel_count; ++i) {
-    const rk_channel *now = &tick->channel[i];
+    const rk_channel* now = &tick->channel[i];
     int64_t base[3] = {0, 0, 0};
     if (now->opened_tick <= before->head.tick) memcpy(base, now->impulse, sizeof base);
     for (uint32_t j = 0; j < before->head.channel_count; ++j) {
@@ -45,14 +46,15 @@ static void consume(rk_frame *frame, const rk_tick *tick, const rk_tick *before,
     }
   }
   frame->head.acked_tick = tick->head.tick;
+  return 1;
 }
 
 /* The tangent plane at the box's nearest point, for each finger in reach. */
-static void find_planes(rk_frame *frame, const rk_tick *tick) {
+static void find_planes(rk_frame* frame, const rk_tick* tick) {
   frame->head.plane_count = 0;
   for (uint32_t i = 0; i < tick->head.pointer_count; ++i) {
-    const rk_pointer *finger = &tick->pointer[i];
-    rk_plane *plane = &frame->plane[frame->head.plane_count];
+    const rk_pointer* finger = &tick->pointer[i];
+    rk_plane* plane = &frame->plane[frame->head.plane_count];
     double distance = 0;
     int deepest = 0;
     memset(plane, 0, sizeof *plane);
@@ -86,7 +88,7 @@ typedef struct peer {
 } peer;
 
 /* A world at 20 Hz may look for its peer in its own loop; a force loop may not (5.3-1). */
-static void look_for(peer *haptic, const char *instance) {
+static void look_for(peer* haptic, const char* instance) {
   const rk_need need = {RK_HAPTIC_TICK, 1, 0};
   if (rk_attach(&haptic->view, instance, RK_HAPTIC, &need, 1) != RK_ATTACHED) return;
   if (haptic->view.inode == haptic->refused) {
@@ -97,30 +99,29 @@ static void look_for(peer *haptic, const char *instance) {
 }
 
 /* Every tick that was published and not read yet. 0 if the peer breaks the protocol. */
-static int drain(peer *haptic, rk_frame *frame) {
+static int drain(peer* haptic, rk_frame* frame) {
   uint64_t words[RK_TICK_BYTES / 8];
   rk_received received;
   rk_tick tick;
   while (!rk_hopeless(&haptic->reader)) {
-    const enum rk_read_status read =
-        rk_read_next(&haptic->reader, words, sizeof words, &received);
+    const enum rk_read_status read = rk_read_next(&haptic->reader, words, sizeof words, &received);
     if (read == RK_BACKWARDS) return 0;
     if (read != RK_FRESH && read != RK_REJECTED) return 1;
     if (read == RK_FRESH &&
         rk_accept(&haptic->reader, &received, rk_decode_tick(words, sizeof words, &received, &tick),
-                  rk_now_ns()) == RK_SOUND) {
-      consume(frame, &tick, &haptic->tick, haptic->view.header.epoch);
+                  rk_now_ns()) == RK_SOUND &&
+        consume(frame, &tick, &haptic->tick, haptic->view.header.epoch)) {
       haptic->tick = tick;
     }
   }
   return 0;
 }
 
-int main(int argc, char **argv) {
+int main(int argc, char** argv) {
   static peer haptic;
   static rk_frame frame;
-  const char *instance = argc > 1 ? argv[1] : "0";
-  const rk_stream_spec stream = {RK_WORLD_FRAME, RK_FRAME_BYTES, 8, kPeriodNs};
+  const char* instance = argc > 1 ? argv[1] : "0";
+  const rk_stream_spec stream = {RK_WORLD_FRAME, RK_FRAME_ROOM, 8, kPeriodNs};
   const struct timespec period = {0, (long)kPeriodNs};
   uint64_t words[RK_FRAME_BYTES / 8];
   rk_segment own;
@@ -150,7 +151,9 @@ int main(int argc, char **argv) {
     find_planes(&frame, &haptic.tick);
     if (rk_encode_frame(&frame, words, &shape)) rk_publish(&writer, words, &shape, rk_now_ns());
     rk_heartbeat(&own, frame.head.frame, rk_now_ns());
+    if (haptic.attached) rk_report(&own, &haptic.reader);
     if (over) {
+      rk_report_last(&own, &haptic.reader);
       rk_detach(&haptic.view);
       haptic.attached = 0;
     }
