@@ -157,7 +157,7 @@ void ConfigSchema::Vectors(const std::string& key, std::vector<Vec3>* target, do
 }
 
 void ConfigSchema::AddChoice(const std::string& key, const std::vector<std::string>& names,
-                             std::function<void(std::size_t)> assign,
+                             const std::function<void(std::size_t)>& assign,
                              std::function<std::string()> show, const std::string& doc) {
   std::string expected = "one of";
   for (const std::string& name : names) expected += (&name == &names[0] ? " " : " | ") + name;

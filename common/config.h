@@ -85,7 +85,7 @@ class ConfigSchema {
 
   void Add(const std::string& key, Entry entry);
   void AddChoice(const std::string& key, const std::vector<std::string>& names,
-                 std::function<void(std::size_t)> assign, std::function<std::string()> show,
+                 const std::function<void(std::size_t)>& assign, std::function<std::string()> show,
                  const std::string& doc);
   void Assign(const std::string& key, const std::string& value, const std::string& origin,
               const std::string& folder);

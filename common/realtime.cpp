@@ -106,7 +106,7 @@ RealtimeThread::RealtimeThread(const RealtimeRequest& request, std::function<voi
   const int error = pthread_create(&thread_, &attributes, Run, start.get());
   pthread_attr_destroy(&attributes);
   if (error != 0) throw std::system_error(error, std::generic_category(), "pthread_create");
-  start.release();  // the thread owns it now
+  (void)start.release();  // the thread owns it now
   obtained_ = obtained.get();
 }
 

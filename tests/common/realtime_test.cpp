@@ -121,6 +121,14 @@ TEST_CASE("the destructor joins") {
   CHECK(ended);
 }
 
+TEST_CASE("a thread can ask what it runs under") {
+  const Kernel kernel = AskKernel();
+  const RealtimeObtained now = ReadScheduling();
+  CHECK(now.policy == kernel.policy);
+  CHECK(now.priority == kernel.priority);
+  CHECK(now.refusal.empty());
+}
+
 TEST_CASE("policies have names") {
   CHECK(PolicyName(SCHED_OTHER, 0) == "SCHED_OTHER");
   CHECK(PolicyName(SCHED_FIFO, 80) == "SCHED_FIFO 80");
