@@ -51,9 +51,11 @@ class MessageReader {
 
   /// Unless kFresh, `message` is untouched. `now_ns`: CLOCK_MONOTONIC just before the call. // RT:
   ReadStatus ReadLatest(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    if (hopeless()) return ReadStatus::kEmpty;
     return Accept(reader_.ReadLatest(words_, received_), message, now_ns);
   }
   ReadStatus ReadNext(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    if (hopeless()) return ReadStatus::kEmpty;
     return Accept(reader_.ReadNext(words_, received_), message, now_ns);
   }
 
@@ -64,7 +66,7 @@ class MessageReader {
   std::uint32_t rejected_in_a_row() const noexcept { return rejected_in_a_row_; }
   /// Why the last rejected message was.
   DecodeStatus refusal() const noexcept { return refusal_; }
-  /// The peer talks nonsense: PeerLink::Refuse() it.
+  /// The peer talks nonsense: PeerLink::Refuse() it. Final: nothing more is read from this ring.
   bool hopeless() const noexcept {
     return backwards_ || rejected_in_a_row_ >= kRejectionsBeforeDetach;
   }

@@ -1,7 +1,6 @@
 #include "protocol/validate.h"
 
 #include <cmath>
-#include <limits>
 
 namespace rikiseki::protocol {
 namespace {
@@ -244,8 +243,8 @@ DecodeStatus Validate(SceneCollider& c) {
     for (std::size_t i = 0; i < DimensionsOf(c.shape); ++i) {
       // A capsule without length is a sphere.
       const bool may_vanish = c.shape == ShapeType::kCapsule && i == 1;
-      const double least = may_vanish ? 0 : std::numeric_limits<double>::min();
-      if (c.dimensions[i] < least) return DecodeStatus::kRange;
+      const double dimension = c.dimensions[i];
+      if (!(dimension > 0) && !(may_vanish && dimension == 0)) return DecodeStatus::kRange;
     }
   }
   return Normalise(c.orientation);
