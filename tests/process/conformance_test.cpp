@@ -16,15 +16,6 @@ using protocol::Role;
 // The kit's own watchdogs end it long before; this only keeps a hang from lasting for ever.
 constexpr double kPatience = 180;
 
-struct Instance {
-  std::string name = FreshInstance();
-  ~Instance() {
-    for (const char* role : {".haptic", ".world"}) {
-      std::filesystem::remove("/dev/shm/rikiseki." + name + role);
-    }
-  }
-};
-
 /// The kit's exit status; its report, if that is not 0, goes to the test's.
 int Check(const std::string& instance, const std::vector<std::string>& more) {
   const std::string junit = (std::filesystem::temp_directory_path() / (instance + ".xml")).string();
@@ -46,51 +37,56 @@ int Check(const std::string& instance, const std::vector<std::string>& more) {
 }  // namespace
 
 TEST_CASE("haptic_server passes protocol_check --strict, its hand at rest") {
-  const Instance instance;
+  const Instance owned;
+  const std::string instance = owned;
   const Child haptic({Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"),
-                      "--instance", instance.name, "--set", "hand.script=rest"});
-  CHECK(Check(instance.name, {"--as", "world"}) == 0);
+                      "--instance", instance, "--set", "hand.script=rest"});
+  CHECK(Check(instance, {"--as", "world"}) == 0);
 }
 
 TEST_CASE("world_server passes protocol_check --strict, with a box that is fixed, and one that moves") {
   const bool fixed = GENERATE(true, false);
   const std::string scene = fixed ? "config/scenes/conformance.sdf" : "config/scenes/push.sdf";
   INFO(scene);
-  const Instance instance;
+  const Instance owned;
+  const std::string instance = owned;
   const Child world({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
-                     "--instance", instance.name, "--set", "scene.file=" + SourceFile(scene)});
-  CHECK(Check(instance.name, {"--as", "haptic"}) == 0);
+                     "--instance", instance, "--set", "scene.file=" + SourceFile(scene)});
+  CHECK(Check(instance, {"--as", "haptic"}) == 0);
 }
 
 TEST_CASE("peer.py passes protocol_check --strict on both sides") {
   const bool as_world = GENERATE(true, false);
   INFO("judged by the kit as " << (as_world ? "world" : "haptic"));
-  const Instance instance;
+  const Instance owned;
+  const std::string instance = owned;
   const Child peer({"/usr/bin/python3", SourceFile("scripts/peer.py"),
-                    as_world ? "haptic" : "world", "--instance", instance.name});
-  CHECK(Check(instance.name, {"--as", as_world ? "world" : "haptic"}) == 0);
+                    as_world ? "haptic" : "world", "--instance", instance});
+  CHECK(Check(instance, {"--as", as_world ? "world" : "haptic"}) == 0);
 }
 
 TEST_CASE("protocol_check inspect: a live pair is sound, nobody is no pair") {
-  const Instance instance;
-  Child nobody({Program("protocol_check"), "inspect", instance.name});
+  const Instance owned;
+  const std::string instance = owned;
+  Child nobody({Program("protocol_check"), "inspect", instance});
   CHECK(nobody.Wait() == 1);
   const Child haptic({Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"),
-                      "--instance", instance.name});
+                      "--instance", instance});
   const Child world({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
-                     "--instance", instance.name});
-  Observe(instance.name, Role::kHaptic);
-  Observe(instance.name, Role::kWorld);
-  Child kit({Program("protocol_check"), "inspect", instance.name, "--strict"});
+                     "--instance", instance});
+  Observe(instance, Role::kHaptic);
+  Observe(instance, Role::kWorld);
+  Child kit({Program("protocol_check"), "inspect", instance, "--strict"});
   CHECK(kit.Wait() == 0);
 }
 
 TEST_CASE("protocol_check refuses a role that somebody has, and wrong command lines") {
-  const Instance instance;
+  const Instance owned;
+  const std::string instance = owned;
   const Child world({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
-                     "--instance", instance.name});
-  Observe(instance.name, Role::kWorld);
-  Child kit({Program("protocol_check"), "--as", "world", "--instance", instance.name});
+                     "--instance", instance});
+  Observe(instance, Role::kWorld);
+  Child kit({Program("protocol_check"), "--as", "world", "--instance", instance});
   CHECK(kit.Wait() == 75);
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
            {"--as", "both"}, {}, {"inspect"}, {"--as", "world", "--case", "haptic/none"},

@@ -183,12 +183,12 @@ bool Haptic::ReadFrame(WorldFrame& fresh) {
 }
 
 void Haptic::TakeAck(const WorldFrame& fresh) {
-  if (fault == HapticFault::kBooksAnyAck) {
+  const bool sound = fresh.acked_epoch == segment->epoch() && fresh.acked_tick < tick &&
+                     fresh.acked_tick >= acked_tick;
+  if (!sound && fault == HapticFault::kBooksAnyAck) {
     books.applied = Plus(books.applied, Minus(fresh.applied, world_applied));
-    world_applied = fresh.applied;
   }
-  if (fresh.acked_epoch != segment->epoch() || fresh.acked_tick >= tick) return;
-  if (fresh.acked_tick < acked_tick) return;
+  if (!sound) return;
   const ImpulseUnits upto = history[fresh.acked_tick];
   if (acking_world != view_epoch || world_baseline != fresh.baseline_tick) {
     if (fresh.baseline_tick < acked_tick && acking_world != view_epoch) return;

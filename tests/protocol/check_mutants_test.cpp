@@ -101,7 +101,7 @@ TEST_CASE("the kit fails every haptic mutant in the case that is about it") {
       {HapticFault::kEverySecondTick, "haptic/6.1-3/tick-numbers"},
       {HapticFault::kBooksAnyAck, "haptic/7.6-4/false-acks"},
       {HapticFault::kNoThreeFrames, "haptic/5.5-3/three-frames"},
-      {HapticFault::kOverCap, "haptic/5.5-7/force-cap"},
+      {HapticFault::kOverCap, "haptic/5.5-7/pressed-hard"},
   }));
   std::string text;
   const Verdict verdict = JudgedHaptic(fault, id, text);

@@ -136,8 +136,11 @@ bool World::Consume() {
     const Ring ring = careless->RingOf(careless->header().stream[0]);
     const std::uint64_t newest =
         std::atomic_ref<std::uint64_t>(*ring.published).load(std::memory_order_acquire);
-    if (newest == careless_cursor) return false;
-    careless_cursor = newest - careless_cursor > ring.slot_count - 2 ? newest : careless_cursor + 1;
+    if (newest <= careless_cursor) return false;
+    if (newest - careless_cursor > ring.slot_count - 2) {
+      careless_cursor = newest - ring.slot_count / 2;
+    }
+    ++careless_cursor;
     if (ReadCarelessly(ring, careless_cursor, {.first = true, .second = false}, tick)) Take(tick);
     return true;
   }

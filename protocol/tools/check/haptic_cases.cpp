@@ -115,6 +115,26 @@ void Contact(WorldPlayer& player) {
           "no open channel for our body and generation");
 }
 
+// As far in as the force goes, but no farther than a finger yields.
+void PressedHard(WorldPlayer& player) {
+  player.Press();
+  const Vector start = player.planes[0].point;
+  const Vector normal = player.planes[0].normal;
+  const std::uint64_t breaches = player.monitor().breaches(kCap);
+  double depth = 0;
+  player.animate = [&] {
+    depth = std::min(depth + 0.001, 0.03);
+    player.planes[0].point = Sum(start, Scaled(normal, depth));
+  };
+  const auto hard = [&] { return player.Force() >= 0.95 * player.newest().force_cap; };
+  const bool reached = player.Until([&] { return hard() || depth >= 0.03; }, 3) && hard();
+  player.Run(0.1);
+  player.animate = nullptr;
+  player.Leave();
+  if (player.monitor().breaches(kCap) > breaches) player.monitor().Report(kCap);
+  if (!reached) Inform("the finger yields before force_cap is reached");
+}
+
 // Long enough that every term of 7.3 was seen with a force that changes.
 void Accounts(WorldPlayer& player) {
   player.Press();
@@ -292,6 +312,7 @@ constexpr HapticCase kContactCases[] = {
     {"haptic/5.3-3/attaches", Attaches},
     {"haptic/6.1-6/no-contact", NoContact},
     {"haptic/7.2-2/contact", Contact},
+    {"haptic/5.5-7/pressed-hard", PressedHard},
     {"haptic/7.2-5/accounts", Accounts},
     {"haptic/5.5-3/three-frames", ThreeFrames},
     {"haptic/6.1-4/other-pointer", FarPointer},
@@ -309,6 +330,7 @@ void Monitored(WorldPlayer& player) {
     player.Press();
     player.Run(0.3);
     player.Release();
+    player.Run(0.1);
     player.Leave();
   }
   player.monitor().Report(kId);

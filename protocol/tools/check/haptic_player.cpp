@@ -251,10 +251,9 @@ void HapticPlayer::JudgeFrame(std::span<const std::uint64_t> words, const Receiv
     monitor_.Judge(kBaselineRange, frame.baseline_tick <= frame.acked_tick,
                    [&] { return "baseline_tick is greater than acked_tick" + at; });
     if (ours) {
-      const auto& by_tick = epoch->second.by_tick;
-      const auto acked = by_tick.find(frame.acked_tick);
-      const auto baseline = by_tick.find(frame.baseline_tick);
-      monitor_.Judge(kAckForward, acked != by_tick.end(), [&] {
+      const auto acked = epoch->second.At(frame.acked_tick);
+      const auto baseline = epoch->second.At(frame.baseline_tick);
+      monitor_.Judge(kAckForward, acked.has_value(), [&] {
         return "acknowledges tick " + std::to_string(frame.acked_tick) +
                ", which was not performed" + at;
       });
@@ -262,9 +261,9 @@ void HapticPlayer::JudgeFrame(std::span<const std::uint64_t> words, const Receiv
                      epoch->second.spoilt.count(frame.acked_tick) == 0 &&
                          epoch->second.spoilt.count(frame.baseline_tick) == 0,
                      [&] { return "acknowledges a tick that had to be rejected" + at; });
-      if (acked != by_tick.end() && baseline != by_tick.end()) {
+      if (acked && baseline) {
         const ImpulseUnits said = Plus(frame.applied, frame.discarded);
-        const ImpulseUnits is = Minus(acked->second, baseline->second);
+        const ImpulseUnits is = Minus(*acked, *baseline);
         monitor_.Judge(kSum, said == is, [&] {
           return "applied + discarded = " + Text(said) + ", the channels grew by " + Text(is) +
                  " from tick " + std::to_string(frame.baseline_tick) + " to " +

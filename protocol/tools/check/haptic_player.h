@@ -70,8 +70,6 @@ class HapticPlayer {
 
   // ---- Time.
   void Step();
-  /// Reads frames, and nothing else.
-  void Peek() { Drain(); }
   void Run(double seconds);
   bool Until(const std::function<bool()>& done, double seconds);
 
@@ -97,6 +95,8 @@ class HapticPlayer {
   /// The number counts as used; the world must never acknowledge it.
   void PublishSpoilt(const HapticTick& tick,
                      const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil);
+  /// Ticks up to `last` count as performed, with the totals of the newest.
+  void PerformedAlike(std::uint64_t last) { published_[segment_->epoch()].alike_until = last; }
   std::uint64_t tick() const { return next_tick_ - 1; }
   RawWriter& writer() { return writer_; }
 
@@ -152,6 +152,14 @@ class HapticPlayer {
     ImpulseUnits displayed{};            // growth since the first
     std::map<std::uint64_t, ImpulseUnits> by_tick;
     std::map<std::uint64_t, bool> spoilt;
+    std::uint64_t alike_until = 0;
+
+    std::optional<ImpulseUnits> At(std::uint64_t tick) const {
+      const auto exact = by_tick.find(tick);
+      if (exact != by_tick.end()) return exact->second;
+      if (tick < alike_until) return displayed;
+      return std::nullopt;
+    }
   };
   std::map<std::uint64_t, Published> published_;  // by epoch
 };

@@ -159,10 +159,11 @@ void RawWriter::Publish(std::span<const std::uint64_t> payload, Encoded shape,
 
 void RawWriter::PublishPartly(std::span<const std::uint64_t> payload, Encoded shape,
                               std::size_t missing) {
+  const auto now = static_cast<std::uint64_t>(MonotonicNow());
   std::size_t stores = 0;
-  PublishStores(ring_, published_ + 1, payload, shape.blocks, 0,
+  PublishStores(ring_, published_ + 1, payload, shape.blocks, now,
                 [&stores](std::uint64_t&, std::uint64_t, std::memory_order) { ++stores; });
-  PublishStores(ring_, published_ + 1, payload, shape.blocks, 0,
+  PublishStores(ring_, published_ + 1, payload, shape.blocks, now,
                 [&](std::uint64_t& word, std::uint64_t value, std::memory_order order) {
                   if (stores > missing) Store(word, value, order);
                   --stores;
