@@ -18,6 +18,13 @@ void SleepUntil(std::int64_t deadline_ns) noexcept {
   }
 }
 
+std::int64_t PeriodicSchedule::WakeUp(std::int64_t now_ns) noexcept {
+  if (now_ns < deadline_ns_) return 0;
+  const std::int64_t missed = (now_ns - deadline_ns_) / period_ns_;
+  deadline_ns_ += missed * period_ns_;
+  return missed;
+}
+
 std::int64_t PeriodicSchedule::Advance(std::int64_t now_ns) noexcept {
   deadline_ns_ += period_ns_;
   if (now_ns < deadline_ns_) return 0;

@@ -30,6 +30,10 @@ class PeriodicSchedule {
   std::int64_t deadline_ns() const { return deadline_ns_; }
   std::int64_t period_ns() const { return period_ns_; }
 
+  /// The sleep until the deadline ended at `now_ns`. Moves to the last deadline that has come by then and
+  /// returns how many were slept through before it: a process that was stopped meanwhile. // RT:
+  std::int64_t WakeUp(std::int64_t now_ns) noexcept;
+
   /// Moves to the next deadline that lies after `now_ns`, the time when the work of the current one
   /// ended. Returns how many deadlines were skipped. // RT:
   std::int64_t Advance(std::int64_t now_ns) noexcept;

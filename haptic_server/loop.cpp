@@ -29,8 +29,12 @@ void HapticLoop::Run(const std::atomic<bool>& stop) noexcept {
   PeriodicSchedule schedule(MonotonicNow(), period_ns_);
   std::int64_t missed = 0;
   while (!stop.load(std::memory_order_relaxed)) {
-    SleepUntil(schedule.deadline_ns());
-    Tick(MonotonicNow(), schedule.deadline_ns(), missed);
+    const std::int64_t deadline_ns = schedule.deadline_ns();
+    SleepUntil(deadline_ns);
+    const std::int64_t now_ns = MonotonicNow();
+    // A stop while asleep must be known to this tick already, not to the next.
+    missed += schedule.WakeUp(now_ns);
+    Tick(now_ns, deadline_ns, missed);
     missed = schedule.Advance(MonotonicNow());
   }
   Stop();
@@ -50,7 +54,7 @@ void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_
 }
 
 void HapticLoop::Stop() noexcept {
-  step_.Stop(tick_);
+  step_.Stop(MonotonicNow(), tick_);
   PublishTick();
   PublishHealth();
 }
@@ -58,10 +62,15 @@ void HapticLoop::Stop() noexcept {
 // A world that was replaced is read once more before it is let go: its last frame may cover impulses that
 // would be declared lost otherwise.
 WorldInput HapticLoop::ReadWorld() noexcept {
-  protocol::ReadStatus read = frames_.ReadLatest(frame_);
-  if (read != protocol::ReadStatus::kFresh && link_.HasNext()) {
+  const auto read_latest = [this] {
+    return frames_.ReadLatest(frame_, static_cast<std::uint64_t>(MonotonicNow()));
+  };
+  // Asked before the last look: what the dead one published is then all there.
+  const bool has_next = link_.HasNext();
+  protocol::ReadStatus read = read_latest();
+  if (read != protocol::ReadStatus::kFresh && has_next) {
     frames_ = link_.TakeNext()->Reader<protocol::WorldFrame>();
-    read = frames_.ReadLatest(frame_);
+    read = read_latest();
   }
   if (frames_.hopeless()) link_.Refuse();
   const protocol::PeerView* view = link_.current();

@@ -267,11 +267,11 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world,
   state.Publish(time, displayed, state.safety.reason(), message);
 }
 
-void HapticStep::Stop(protocol::HapticTick& message) noexcept {
+void HapticStep::Stop(std::int64_t now_ns, protocol::HapticTick& message) noexcept {
   State& state = *state_;
   state.device.Release();
-  const TickTime time{.start_ns = state.start_ns + state.period_ns,
-                      .previous_duration_ns = state.period_ns,
+  const TickTime time{.start_ns = now_ns,
+                      .previous_duration_ns = state.tick == 0 ? 0 : now_ns - state.start_ns,
                       .missed = 0};
   state.safety.Displayed(Vec3::Zero());
   state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,

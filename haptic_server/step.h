@@ -43,8 +43,9 @@ class HapticStep {
   /// Runs one tick and fills the message to publish. // RT: no allocation, lock, log or throw.
   void Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message) noexcept;
 
-  /// Zero force and minimum tension; the message says kStopped. // RT:
-  void Stop(protocol::HapticTick& message) noexcept;
+  /// Zero force and minimum tension at `now_ns`, until when the force of the last tick was held; the
+  /// message says kStopped. // RT:
+  void Stop(std::int64_t now_ns, protocol::HapticTick& message) noexcept;
 
   /// Reason, peer, books and extremes; the shell adds what it knows of the loop. // RT:
   const protocol::HapticHealth& health() const noexcept;

@@ -82,7 +82,8 @@ class PeerView {
   StreamReader Stream(StreamType type) const noexcept;
   template <typename Message>
   MessageReader<Message> Reader() const noexcept {
-    return MessageReader<Message>(Stream(StreamOf<Message>::kType));
+    return MessageReader<Message>(Stream(StreamOf<Message>::kType),
+                                  PeriodNs(StreamOf<Message>::kType));
   }
 
   /// Does its owner's process still live? Asks the kernel for the lock, not for a pid. System call.

@@ -92,6 +92,58 @@ constexpr void PlaneSurfaceFields(Archive& archive, P& p) {
   archive("damping", p.damping);
 }
 
+template <typename Archive, typename P>
+constexpr void PlaneVelocityFields(Archive& archive, P& p) {
+  archive("velocity", p.velocity);
+}
+
+template <typename Archive, typename P>
+constexpr void PlaneFrictionFields(Archive& archive, P& p) {
+  archive("static_friction", p.static_friction);
+  archive("dynamic_friction", p.dynamic_friction);
+}
+
+template <typename Archive, typename P>
+constexpr void PlaneRecoveryFields(Archive& archive, P& p) {
+  archive("recovery_s", p.recovery_s);
+}
+
+template <typename Archive, typename Message>
+constexpr void LocalHeadFields(Archive& archive, Message& m) {
+  archive("local_body_count", m.local_body_count);
+  archive("reserved", m.local_reserved);
+  archive("substep_ns", m.local_substep_ns);
+}
+
+template <typename Archive, typename L>
+constexpr void LocalBodyFields(Archive& archive, L& b) {
+  archive("body", b.body);
+  archive("generation", b.generation);
+  archive("contact_count", b.contact_count);
+  archive("reserved", b.reserved);
+  archive("mass", b.mass);
+  archive("inertia", b.inertia);
+  archive("position", b.position);
+  archive("orientation", b.orientation);
+  archive("velocity", b.velocity);
+  archive("angular_velocity", b.angular_velocity);
+  archive("acceleration", b.acceleration);
+  archive("angular_acceleration", b.angular_acceleration);
+}
+
+template <typename Archive, typename C>
+constexpr void ContactPlaneFields(Archive& archive, C& c) {
+  archive("other_body", c.other_body);
+  archive("other_generation", c.other_generation);
+  archive("point", c.point);
+  archive("normal", c.normal);
+  archive("gap", c.gap);
+  archive("friction", c.friction);
+  archive("other_velocity", c.other_velocity);
+  archive("other_inverse_mass", c.other_inverse_mass);
+  archive("impulse", c.impulse);
+}
+
 template <typename Archive, typename S>
 constexpr void SchedulingFields(Archive& archive, S& s) {
   archive("scheduling.policy", s.policy);
@@ -128,6 +180,13 @@ constexpr void HapticHealthFields(Archive& archive, Message& m) {
   archive("device", m.device);
   archive("lateness", m.lateness);
   archive("duration", m.duration);
+}
+
+template <typename Archive, typename R>
+constexpr void ReconciliationFields(Archive& archive, R& r) {
+  archive("frames", r.frames);
+  archive("newest_jump", r.newest_jump);
+  archive("largest_jump", r.largest_jump);
 }
 
 template <typename Archive, typename Message>
@@ -175,5 +234,52 @@ struct WorldBodiesHeadRecord {
   std::uint32_t body_count = 0;
   std::uint32_t reserved = 0;
 };
+
+/// What stands in front of the scene's lists: WorldScene without them.
+struct WorldSceneHeadRecord {
+  std::uint64_t revision = 0;
+  std::uint64_t needs = 0;
+  std::uint64_t left_out = 0;
+  Vector gravity{};
+  std::array<char, 64> name{};
+  std::uint32_t body_count = 0;
+  std::uint32_t collider_count = 0;
+};
+
+template <typename Archive, typename Head>
+constexpr void WorldSceneHead(Archive& archive, Head& head) {
+  archive("revision", head.revision);
+  archive("needs", head.needs);
+  archive("left_out", head.left_out);
+  archive("gravity", head.gravity);
+  archive("name", head.name);
+  archive("body_count", head.body_count);
+  archive("collider_count", head.collider_count);
+}
+
+template <typename Archive, typename B>
+constexpr void SceneBodyFields(Archive& archive, B& b) {
+  archive("body", b.body);
+  archive("generation", b.generation);
+  archive("fixed", b.fixed);
+  archive("collider_count", b.collider_count);
+  archive("name", b.name);
+}
+
+template <typename Archive, typename C>
+constexpr void SceneColliderFields(Archive& archive, C& c) {
+  archive("shape", c.shape);
+  archive("reserved", c.reserved);
+  archive("dimensions", c.dimensions);
+  archive("position", c.position);
+  archive("orientation", c.orientation);
+  archive("colour", c.colour);
+}
+
+template <typename Archive, typename M>
+constexpr void SceneMeshFields(Archive& archive, M& m) {
+  archive("sha256", m.sha256);
+  archive("path", m.path);
+}
 
 }  // namespace rikiseki::protocol

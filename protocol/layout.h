@@ -156,6 +156,17 @@ constexpr void WriteLayout(Sink& sink) {
   const auto frame = [](auto& a, const WorldFrame& m) { WorldFrameHead(a, m); };
   const auto plane = [](auto& a, const Plane& p) { PlaneFields(a, p); };
   const auto surface = [](auto& a, const Plane& p) { PlaneSurfaceFields(a, p); };
+  const auto velocity = [](auto& a, const Plane& p) { PlaneVelocityFields(a, p); };
+  const auto friction = [](auto& a, const Plane& p) { PlaneFrictionFields(a, p); };
+  const auto recovery = [](auto& a, const Plane& p) { PlaneRecoveryFields(a, p); };
+  const auto local_head = [](auto& a, const WorldFrame& m) { LocalHeadFields(a, m); };
+  const auto local_body = [](auto& a, const LocalBody& b) { LocalBodyFields(a, b); };
+  const auto contact = [](auto& a, const ContactPlane& c) { ContactPlaneFields(a, c); };
+  const auto reconciliation = [](auto& a, const Reconciliation& r) { ReconciliationFields(a, r); };
+  const auto scene = [](auto& a, const WorldSceneHeadRecord& h) { WorldSceneHead(a, h); };
+  const auto scene_body = [](auto& a, const SceneBody& b) { SceneBodyFields(a, b); };
+  const auto collider = [](auto& a, const SceneCollider& c) { SceneColliderFields(a, c); };
+  const auto mesh = [](auto& a, const SceneMesh& m) { SceneMeshFields(a, m); };
   const auto haptic_health = [](auto& a, const HapticHealth& m) { HapticHealthFields(a, m); };
   const auto world_health = [](auto& a, const WorldHealth& m) { WorldHealthFields(a, m); };
   const auto bodies = [](auto& a, const WorldBodiesHeadRecord& h) { WorldBodiesHead(a, h); };
@@ -166,12 +177,23 @@ constexpr void WriteLayout(Sink& sink) {
   record("haptic.tick/pointer_rotation", rotation, Pointer{});
   record("haptic.tick/ground", ground, GroundChannel{});
   record("haptic.health", haptic_health, HapticHealth{});
+  record("haptic.health/reconciliation", reconciliation, Reconciliation{});
   record("world.frame", frame, WorldFrame{});
   record("world.frame/plane", plane, Plane{});
   record("world.frame/plane_surface", surface, Plane{});
+  record("world.frame/plane_velocity", velocity, Plane{});
+  record("world.frame/plane_friction", friction, Plane{});
+  record("world.frame/plane_recovery", recovery, Plane{});
+  record("world.frame/local", local_head, WorldFrame{});
+  record("world.frame/local_body", local_body, LocalBody{});
+  record("world.frame/contact_plane", contact, ContactPlane{});
   record("world.health", world_health, WorldHealth{});
   record("world.bodies", bodies, WorldBodiesHeadRecord{});
   record("world.bodies/body", body, Body{});
+  record("world.scene", scene, WorldSceneHeadRecord{});
+  record("world.scene/body", scene_body, SceneBody{});
+  record("world.scene/collider", collider, SceneCollider{});
+  record("world.scene/mesh", mesh, SceneMesh{});
 }
 
 constexpr std::uint64_t LayoutHash() {

@@ -7,13 +7,17 @@
 #include <cstdint>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 namespace rikiseki::protocol {
 
 inline constexpr std::uint32_t kMaxPointers = 4;
 inline constexpr std::uint32_t kMaxChannels = 16;
 inline constexpr std::uint32_t kMaxPlanes = 32;
+inline constexpr std::uint32_t kMaxLocalBodies = 4;
+inline constexpr std::uint32_t kMaxContactPlanes = 16;  // of one local body
 inline constexpr std::uint32_t kMaxBodies = 10000;
+inline constexpr std::uint32_t kMaxColliders = 20000;
 inline constexpr std::uint32_t kHistogramBuckets = 256;
 
 /// Impulses travel as int64 multiples of this: N s (linear) and N m s (angular). SPEC.md 7.1.
@@ -29,7 +33,14 @@ enum class StreamType : std::uint32_t {
   kWorldFrame = 16,
   kWorldHealth = 17,
   kWorldBodies = 18,
+  kWorldScene = 19,
 };
+
+/// How often a stream's payload has grown since its first version. SPEC.md 3.2, 8.1.
+constexpr std::uint16_t TypeVersion(StreamType type) {
+  const bool grew = type == StreamType::kWorldFrame || type == StreamType::kHapticHealth;
+  return grew ? 2 : 1;
+}
 
 /// Why the displayed force is what it is. The numbers are wire format: append only.
 enum class ForceReason : std::uint32_t {
@@ -119,11 +130,46 @@ struct Plane {
   std::uint32_t pointer = 0;
   std::uint32_t body = 0;
   std::uint32_t generation = 0;
-  std::uint32_t feature = 0;  // identity within the body: interpolation pairs equal ones
-  Vector point{};             // m, on the surface, in W
-  Vector normal{};            // unit, out of the body
-  double stiffness = 0;       // N/m of this surface; 0 = the haptic side's own
-  double damping = 0;         // N s/m; used only where stiffness > 0
+  std::uint32_t feature = 0;    // identity within the body: interpolation pairs equal ones
+  Vector point{};               // m, on the surface, in W
+  Vector normal{};              // unit, out of the body
+  double stiffness = 0;         // N/m of this surface; 0 = the haptic side's own
+  double damping = 0;           // N s/m; used only where stiffness > 0
+  Vector velocity{};            // m/s, of the body's material at `point`, which friction needs
+  double static_friction = 0;   // of the finger on this surface, Coulomb
+  double dynamic_friction = 0;  // likewise; 0 = none
+  double recovery_s = 0;  // how long its force takes to come and go; 0 = the haptic side's own
+};
+
+/// Where a local body touches, or may touch before the next frame, something else than the finger.
+struct ContactPlane {
+  std::uint32_t other_body = 0;  // whose surface it is
+  std::uint32_t other_generation = 0;
+  Vector point{};           // m, of the local body, in its frame B
+  Vector normal{};          // unit, in W, out of the other body
+  double gap = 0;           // m, along the normal at the pose of this frame; < 0 = penetration
+  double friction = 0;      // Coulomb, of the pair
+  Vector other_velocity{};  // m/s, of the other body at the point
+  double other_inverse_mass = 0;  // 1/kg, how the other body yields there; 0 = it does not
+  Vector impulse{};  // N s, in W, on the local body in the last substep: warms the solver up
+};
+
+/// A body that the haptic side moves by itself between two frames. design decision 3, `local`.
+struct LocalBody {
+  std::uint32_t body = 0;
+  std::uint32_t generation = 0;
+  std::uint32_t contact_count = 0;
+  std::uint32_t reserved = 0;
+  double mass = 1;  // kg
+  std::array<double, 6> inertia{1, 0, 0,
+                                1, 0, 1};  // kg m^2, xx xy xz yy yz zz, about the centre, in B
+  Vector position{};                       // m, centre of mass, in W
+  Quaternion orientation{1, 0, 0, 0};
+  Vector velocity{};              // m/s
+  Vector angular_velocity{};      // rad/s
+  Vector acceleration{};          // m/s^2, by what does not answer the push: gravity, drag
+  Vector angular_acceleration{};  // rad/s^2, likewise
+  std::array<ContactPlane, kMaxContactPlanes> contacts{};
 };
 
 /// One world frame: "includes everything up to tick `acked_tick` of haptic epoch `acked_epoch`".
@@ -139,6 +185,10 @@ struct WorldFrame {
   Coupling coupling = Coupling::kImpulse;
   std::uint32_t plane_count = 0;
   std::array<Plane, kMaxPlanes> planes{};
+  std::uint32_t local_body_count = 0;
+  std::uint32_t local_reserved = 0;
+  std::uint64_t local_substep_ns = 0;  // of the world's solver: what the impulses are about
+  std::array<LocalBody, kMaxLocalBodies> local_bodies{};
 };
 
 // ---------------------------------------------------------------------------------------------------
@@ -175,6 +225,13 @@ struct Books {
   ImpulseUnits peer_lost{};  // displayed to a world that died before it acked
 };
 
+/// How well local bodies agree with the world's frames.
+struct Reconciliation {
+  std::uint64_t frames = 0;  // that moved a local body
+  double newest_jump = 0;    // m, by the newest of them
+  double largest_jump = 0;   // m, since the start
+};
+
 struct HapticHealth {
   std::uint64_t ticks = 0;
   std::uint64_t period_ns = 0;
@@ -198,6 +255,7 @@ struct HapticHealth {
   std::array<char, 32> device{};  // name, NUL padded
   Histogram lateness{};           // of the wake-up against the schedule, ns
   Histogram duration{};           // of the tick's work, ns
+  Reconciliation reconciliation{};
 };
 
 /// Why a world did not apply an impulse.
@@ -238,8 +296,69 @@ struct Body {
   Vector angular_velocity{};
 };
 
-static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 80);
-static_assert(sizeof(Body) == 120);
+/// What a scene needs; a part that it does not need is left out of solver, messages and tick.
+/// design decision 11. Bits of WorldScene::needs and left_out.
+enum SceneNeed : std::uint64_t {
+  kNeedMovingBodies = 1,
+  kNeedBodyContacts = 2,  // among moving bodies
+  kNeedFriction = 4,
+  kNeedRotation = 8,
+  kNeedDrag = 16,
+  kNeedFastBodies = 32,
+  kNeedDeformation = 64,
+  kNeedLocalBodies = 128,
+};
+inline constexpr std::uint64_t kAllSceneNeeds = 255;
+
+enum class ShapeType : std::uint32_t {
+  kBox = 1,        // half extents x y z
+  kSphere = 2,     // radius
+  kHalfSpace = 3,  // unit normal out of the solid, which ends at the origin of the shape
+  kCylinder = 4,   // radius, half length along z
+  kCapsule = 5,    // radius, half length along z without the caps
+  kEllipsoid = 6,  // radii x y z
+  kMesh = 7,       // scale x y z
+};
+
+struct SceneCollider {
+  ShapeType shape = ShapeType::kBox;
+  std::uint32_t reserved = 0;
+  Vector dimensions{};  // m, by shape; 0 where the shape has fewer
+  Vector position{};    // m, in the body's frame B
+  Quaternion orientation{1, 0, 0, 0};
+  std::array<double, 4> colour{0.7, 0.7, 0.7, 1};  // red green blue alpha, 0..1
+};
+
+struct SceneBody {
+  std::uint32_t body = 0;
+  std::uint32_t generation = 0;
+  std::uint32_t fixed = 0;  // 1: cannot move
+  std::uint32_t collider_count = 0;
+  std::array<char, 64> name{};  // NUL padded
+};
+
+/// Where the triangles of a mesh collider are.
+struct SceneMesh {
+  std::array<std::uint8_t, 32> sha256{};  // of the file's bytes
+  std::array<char, 224> path{};           // NUL padded
+};
+
+/// What does not change while a scene runs: for observers that draw it.
+struct WorldScene {
+  std::uint64_t revision = 0;  // from 1, grows with every load
+  std::uint64_t needs = 0;     // bits of SceneNeed; in neither = not worked out
+  std::uint64_t left_out = 0;
+  Vector gravity{};             // m/s^2
+  std::array<char, 64> name{};  // NUL padded
+  std::vector<SceneBody> bodies;
+  std::vector<SceneCollider> colliders;  // of the first body, then of the second, ...
+  std::vector<SceneMesh> meshes;         // of each collider of shape kMesh, in their order
+};
+
+static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 128);
+static_assert(sizeof(ContactPlane) == 128 && sizeof(LocalBody) == 224 + 16 * 128);
+static_assert(sizeof(Body) == 120 && sizeof(SceneCollider) == 120 && sizeof(SceneBody) == 80 &&
+              sizeof(SceneMesh) == 256);
 static_assert(std::is_trivially_copyable_v<HapticTick> && std::is_trivially_copyable_v<WorldFrame>);
 static_assert(std::is_trivially_copyable_v<HapticHealth> &&
               std::is_trivially_copyable_v<WorldHealth>);

@@ -18,6 +18,11 @@
 namespace rikiseki::protocol {
 namespace {
 
+// A frame's slot takes 16 KiB, so that blocks of later versions do not move the ring.
+constexpr std::uint32_t kWorldFrameRoom = 16384 - sizeof(SlotHeader);
+static_assert(kWorldFrameBytes <= kWorldFrameRoom);
+constexpr std::uint32_t kMeshRoom = 64;  // meshes that world.scene can name
+
 constexpr int kExitUsage = 64;
 constexpr int kExitTemporary = 75;
 constexpr int kExitConfig = 78;
@@ -145,7 +150,7 @@ Layout Arrange(const std::vector<StreamSpec>& streams) {
     }
     StreamEntry entry{};
     entry.type_id = static_cast<std::uint32_t>(spec.type);
-    entry.type_version = 1;
+    entry.type_version = TypeVersion(spec.type);
     entry.cursor_offset = cursor;
     entry.ring_offset = ring;
     entry.slot_stride = static_cast<std::uint32_t>(
@@ -198,11 +203,14 @@ std::vector<StreamSpec> HapticStreams(std::uint64_t period_ns, std::uint32_t tic
 }
 
 std::vector<StreamSpec> WorldStreams(std::uint64_t period_ns, std::uint32_t bodies,
-                                     std::uint64_t health_period_ns) {
-  return {{StreamType::kWorldFrame, kWorldFrameBytes, 2 * kMinSlots, period_ns},
+                                     std::uint64_t health_period_ns, std::uint32_t colliders) {
+  const std::uint32_t body_room = std::min(bodies, kMaxBodies);
+  const std::uint32_t collider_room = std::min(std::max(body_room, colliders), kMaxColliders);
+  return {{StreamType::kWorldFrame, kWorldFrameRoom, 2 * kMinSlots, period_ns},
           {StreamType::kWorldHealth, kWorldHealthBytes, kMinSlots, health_period_ns},
-          {StreamType::kWorldBodies, WorldBodiesBytes(std::min(bodies, kMaxBodies)), kMinSlots,
-           period_ns}};
+          {StreamType::kWorldBodies, WorldBodiesBytes(body_room), kMinSlots, period_ns},
+          {StreamType::kWorldScene, WorldSceneBytes(body_room, collider_room, kMeshRoom), kMinSlots,
+           0}};
 }
 
 std::string RuntimeDirectory() {

@@ -54,9 +54,10 @@ std::uint32_t HapticTickSlots(std::uint64_t longest_world_period_ns, std::uint64
 std::vector<StreamSpec> HapticStreams(std::uint64_t period_ns, std::uint32_t tick_slots,
                                       std::uint64_t health_period_ns);
 
-/// The streams of a world segment with room for `bodies` bodies (clamped to kMaxBodies).
+/// The streams of a world segment with room for `bodies` bodies (clamped to kMaxBodies) and for
+/// `colliders` of them, at least one each (clamped to kMaxColliders), 64 of them meshes.
 std::vector<StreamSpec> WorldStreams(std::uint64_t period_ns, std::uint32_t bodies,
-                                     std::uint64_t health_period_ns);
+                                     std::uint64_t health_period_ns, std::uint32_t colliders = 0);
 
 struct OwnerOptions {
   std::string instance = "0";

@@ -51,8 +51,12 @@ class PeerLink {
   /// What the loop holds; null before the first TakeNext. A dead peer's view stays until then: its
   /// last messages can still be read. // RT:
   PeerView* current() const noexcept { return current_; }
-  /// A newer peer waits to be taken. // RT:
-  bool HasNext() const noexcept { return offered_.load(std::memory_order_relaxed) != nullptr; }
+  /// A newer peer waits to be taken. Whatever current() is read for after this said so is its last word: its
+  /// owner died or closed before. // RT:
+  bool HasNext() const noexcept {
+    // SYNC: offered. The attacher saw the end of the predecessor before it offered the successor.
+    return offered_.load(std::memory_order_acquire) != nullptr;
+  }
   /// Gives back the view held and takes the one on offer; without an offer, changes nothing.
   /// Returns current(). // RT:
   PeerView* TakeNext() noexcept;

@@ -30,21 +30,7 @@ bool StreamWriter::Publish(std::span<const std::uint64_t> payload, std::uint32_t
 
 bool StreamReader::Copy(std::uint64_t number, std::span<std::uint64_t> payload,
                         Received& received) noexcept {
-  std::uint64_t* slot = ring_.Slot(number);
-  // SYNC: whole. Everything that the writer stored before 2n is visible from here on.
-  if (Load(slot[kSequenceWord], std::memory_order_acquire) != 2 * number) return false;
-  // SYNC: slot words. A word of a later message m makes its mark 2m - 1 visible to the last look.
-  const std::uint64_t stamp_ns = Load(slot[kStampWord], std::memory_order_acquire);
-  const std::uint64_t shape = Load(slot[kShapeWord], std::memory_order_acquire);
-  const auto used_bytes = static_cast<std::uint32_t>(shape);
-  const std::size_t words =
-      std::min<std::size_t>(std::min(used_bytes, ring_.payload_bytes) / 8, payload.size());
-  for (std::size_t i = 0; i < words; ++i) {
-    payload[i] = Load(slot[kPayloadWord + i], std::memory_order_acquire);
-  }
-  if (Load(slot[kSequenceWord], std::memory_order_relaxed) != 2 * number) return false;
-  received = {number, stamp_ns, used_bytes, static_cast<std::uint32_t>(shape >> 32)};
-  return true;
+  return CopyLoads(ring_, number, payload, received, Load);
 }
 
 ReadStatus StreamReader::Return(const Received& received) noexcept {

@@ -80,6 +80,37 @@ void PublishStores(const Ring& ring, std::uint64_t number, std::span<const std::
   store(*ring.published, number, std::memory_order_release);
 }
 
+/// What stands beside a payload.
+struct Received {
+  std::uint64_t number = 0;  // n
+  std::uint64_t stamp_ns = 0;
+  std::uint32_t used_bytes = 0;  // what the writer says; copied: min(used_bytes, the buffer)
+  std::uint32_t blocks = 0;
+};
+
+/// Every load of one copy of message `number`, in order, through `load(word, memory_order)`;
+/// whether the copy is whole. One text for the shipped reader and for the test that lets the writer
+/// in before each load.
+template <typename Load>
+bool CopyLoads(const Ring& ring, std::uint64_t number, std::span<std::uint64_t> payload,
+               Received& received, Load&& load) {
+  std::uint64_t* slot = ring.Slot(number);
+  // SYNC: whole. Everything that the writer stored before 2n is visible from here on.
+  if (load(slot[kSequenceWord], std::memory_order_acquire) != 2 * number) return false;
+  // SYNC: slot words. A word of a later message m makes its mark 2m - 1 visible to the last look.
+  const std::uint64_t stamp_ns = load(slot[kStampWord], std::memory_order_acquire);
+  const std::uint64_t shape = load(slot[kShapeWord], std::memory_order_acquire);
+  const auto used_bytes = static_cast<std::uint32_t>(shape);
+  const std::size_t words =
+      std::min<std::size_t>(std::min(used_bytes, ring.payload_bytes) / 8, payload.size());
+  for (std::size_t i = 0; i < words; ++i) {
+    payload[i] = load(slot[kPayloadWord + i], std::memory_order_acquire);
+  }
+  if (load(slot[kSequenceWord], std::memory_order_relaxed) != 2 * number) return false;
+  received = {number, stamp_ns, used_bytes, static_cast<std::uint32_t>(shape >> 32)};
+  return true;
+}
+
 class StreamWriter {
  public:
   StreamWriter() = default;
@@ -108,14 +139,6 @@ enum class ReadStatus : std::uint32_t {
   kRejected,   // the message is nonsense (its lengths, or what it says): keep the previous value
 };
 
-/// What stands beside a payload.
-struct Received {
-  std::uint64_t number = 0;  // n
-  std::uint64_t stamp_ns = 0;
-  std::uint32_t used_bytes = 0;  // what the writer says; copied: min(used_bytes, the buffer)
-  std::uint32_t blocks = 0;
-};
-
 class StreamReader {
  public:
   StreamReader() = default;
@@ -129,6 +152,9 @@ class StreamReader {
   /// of the ring and counts what it lost. At most 3 copies. // RT:
   ReadStatus ReadNext(std::span<std::uint64_t> payload, Received& received) noexcept;
 
+  /// Room for a payload, as the writer's directory says it; 0 without a ring.
+  std::uint32_t payload_bytes() const noexcept { return ring_.payload_bytes; }
+  std::uint32_t slot_count() const noexcept { return ring_.slot_count; }
   /// The number of the message returned last: where ReadNext goes on.
   std::uint64_t cursor() const noexcept { return cursor_; }
   /// Messages that were overwritten before ReadNext saw them.

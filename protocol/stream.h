@@ -36,18 +36,27 @@ class MessageWriter {
   std::array<std::uint64_t, StreamOf<Message>::kBytes / 8> words_{};
 };
 
+/// A reader that has no clock asks with this: stamps and counters are then not held against one.
+inline constexpr std::uint64_t kNoClock = ~std::uint64_t{0};
+/// How far in the future a stamp may lie. SPEC.md 9.2-8.
+inline constexpr std::uint64_t kStampSlackNs = 1'000'000;
+
 template <typename Message>
 class MessageReader {
  public:
   MessageReader() = default;
-  explicit MessageReader(const StreamReader& reader) noexcept : reader_(reader) {}
+  /// `period_ns`: of the stream's directory; 0 = aperiodic.
+  explicit MessageReader(const StreamReader& reader, std::uint64_t period_ns = 0) noexcept
+      : reader_(reader), period_ns_(period_ns) {}
 
-  /// Unless kFresh, `message` is untouched. // RT:
-  ReadStatus ReadLatest(Message& message) noexcept {
-    return Accept(reader_.ReadLatest(words_, received_), message);
+  /// Unless kFresh, `message` is untouched. `now_ns`: CLOCK_MONOTONIC just before the call. // RT:
+  ReadStatus ReadLatest(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    if (hopeless()) return ReadStatus::kEmpty;
+    return Accept(reader_.ReadLatest(words_, received_), message, now_ns);
   }
-  ReadStatus ReadNext(Message& message) noexcept {
-    return Accept(reader_.ReadNext(words_, received_), message);
+  ReadStatus ReadNext(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    if (hopeless()) return ReadStatus::kEmpty;
+    return Accept(reader_.ReadNext(words_, received_), message, now_ns);
   }
 
   const StreamReader& ring() const noexcept { return reader_; }
@@ -57,20 +66,24 @@ class MessageReader {
   std::uint32_t rejected_in_a_row() const noexcept { return rejected_in_a_row_; }
   /// Why the last rejected message was.
   DecodeStatus refusal() const noexcept { return refusal_; }
-  /// The peer talks nonsense: PeerLink::Refuse() it.
+  /// The peer talks nonsense: PeerLink::Refuse() it. Final: nothing more is read from this ring.
   bool hopeless() const noexcept {
     return backwards_ || rejected_in_a_row_ >= kRejectionsBeforeDetach;
   }
 
  private:
-  ReadStatus Accept(ReadStatus status, Message& message) noexcept {
+  ReadStatus Accept(ReadStatus status, Message& message, std::uint64_t now_ns) noexcept {
+    if (status == ReadStatus::kFresh && Jumped(now_ns)) status = ReadStatus::kBackwards;
     if (status == ReadStatus::kBackwards) backwards_ = true;
     if (status == ReadStatus::kRejected) {
       refusal_ = DecodeStatus::kLength;
+    } else if (status == ReadStatus::kFresh && !StampIsSound(now_ns)) {
+      refusal_ = DecodeStatus::kStamp;
     } else if (status == ReadStatus::kFresh) {
       refusal_ = Decode(words_, {received_.used_bytes, received_.blocks}, message);
       if (refusal_ == DecodeStatus::kOk) {
         rejected_in_a_row_ = 0;
+        stamp_ns_ = received_.stamp_ns;
         return status;
       }
     } else {
@@ -81,7 +94,28 @@ class MessageReader {
     return ReadStatus::kRejected;
   }
 
+  bool StampIsSound(std::uint64_t now_ns) const noexcept {
+    if (received_.stamp_ns < stamp_ns_) return false;
+    return now_ns == kNoClock || received_.stamp_ns <= now_ns ||
+           received_.stamp_ns - now_ns <= kStampSlackNs;
+  }
+
+  /// The counter has grown faster than any writer of this period can be meant to. SPEC.md 9.2-9.
+  bool Jumped(std::uint64_t now_ns) noexcept {
+    if (now_ns == kNoClock || period_ns_ == 0) return false;
+    const std::uint64_t periods = looked_ns_ == 0 ? 0 : (now_ns - looked_ns_) / period_ns_;
+    const bool first = looked_ns_ == 0;
+    const std::uint64_t grown = received_.number - looked_number_;
+    looked_ns_ = now_ns;
+    looked_number_ = received_.number;
+    return !first && grown / 4 > periods + reader_.slot_count();
+  }
+
   StreamReader reader_;
+  std::uint64_t period_ns_ = 0;
+  std::uint64_t looked_ns_ = 0;  // when the newest message came; 0 = none yet
+  std::uint64_t looked_number_ = 0;
+  std::uint64_t stamp_ns_ = 0;  // of the message accepted last
   std::array<std::uint64_t, StreamOf<Message>::kBytes / 8> words_{};
   Received received_;
   std::uint64_t rejected_ = 0;
@@ -136,6 +170,49 @@ class BodiesReader {
   std::vector<Body> bodies_;
   Received received_;
   std::uint32_t count_ = 0;
+};
+
+/// world.scene, whose size the scene decides: published when a scene was loaded, not every tick.
+class SceneWriter {
+ public:
+  SceneWriter() = default;
+  explicit SceneWriter(const StreamWriter& writer)
+      : writer_(writer), words_(writer.payload_bytes() / 8) {}
+
+  /// False, and nothing is published, if it does not fit the room that the stream was made with.
+  bool Publish(const WorldScene& scene, std::uint64_t stamp_ns) noexcept {
+    const Encoded encoded = Encode(scene, std::span<std::uint64_t>(words_));
+    if (encoded.used_bytes == 0) return false;
+    return writer_.Publish(std::span<const std::uint64_t>(words_).first(encoded.used_bytes / 8),
+                           encoded.blocks, stamp_ns);
+  }
+
+ private:
+  StreamWriter writer_;
+  std::vector<std::uint64_t> words_;
+};
+
+class SceneReader {
+ public:
+  SceneReader() = default;
+  explicit SceneReader(const StreamReader& reader)
+      : reader_(reader), words_(reader.payload_bytes() / 8) {}
+
+  /// The newest sound scene read; revision 0 before the first.
+  const WorldScene& scene() const noexcept { return scene_; }
+
+  ReadStatus ReadLatest() {
+    Received received;
+    const ReadStatus status = reader_.ReadLatest(words_, received);
+    if (status != ReadStatus::kFresh) return status;
+    const DecodeStatus decoded = Decode(words_, {received.used_bytes, received.blocks}, scene_);
+    return decoded == DecodeStatus::kOk ? status : ReadStatus::kRejected;
+  }
+
+ private:
+  StreamReader reader_;
+  std::vector<std::uint64_t> words_;
+  WorldScene scene_;
 };
 
 }  // namespace rikiseki::protocol

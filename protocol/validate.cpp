@@ -18,6 +18,22 @@ bool AllFinite(const Values&... values) {
 
 constexpr std::uint64_t kLongestPeriodNs = 10'000'000'000;  // SPEC.md 6: no loop is slower
 
+constexpr double kLongestRecovery = 10;      // s, SPEC.md 6.2
+constexpr double kLightestLocalBody = 1e-9;  // kg, likewise
+constexpr double kHeaviestLocalBody = 1e9;
+
+/// Symmetric and positive definite with room to spare: a reader may invert it.
+bool IsInertia(const std::array<double, 6>& inertia) {
+  const double trace = inertia[0] + inertia[3] + inertia[5];
+  if (!(trace >= 1e-18 && trace <= 1e18)) return false;
+  const auto& [xx, xy, xz, yy, yz, zz] = inertia;
+  constexpr double kLeast = 1e-12;  // of the leading minors of inertia / trace
+  const double a = xx / trace, b = xy / trace, c = xz / trace;
+  const double d = yy / trace, e = yz / trace, f = zz / trace;
+  return a > kLeast && a * d - b * b > kLeast &&
+         a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d) > kLeast;
+}
+
 bool IsPeriod(std::uint64_t period_ns) {
   return period_ns >= 1 && period_ns <= kLongestPeriodNs;
 }
@@ -68,7 +84,7 @@ const char* Describe(DecodeStatus status) noexcept {
     case DecodeStatus::kEnumerator:
       return "an enumerator names nothing";
     case DecodeStatus::kIdentity:
-      return "a pointer does not exist or stands twice";
+      return "a pointer or local body does not exist or stands twice";
     case DecodeStatus::kNotFinite:
       return "a value is not finite";
     case DecodeStatus::kRange:
@@ -77,6 +93,8 @@ const char* Describe(DecodeStatus status) noexcept {
       return "an orientation is not a unit quaternion";
     case DecodeStatus::kNormal:
       return "a normal has no direction";
+    case DecodeStatus::kStamp:
+      return "its stamp lies in the future or before that of the message before";
   }
   return "unknown";
 }
@@ -112,6 +130,47 @@ DecodeStatus Validate(HapticTick& m) noexcept {
   return DecodeStatus::kOk;
 }
 
+namespace {
+
+DecodeStatus Validate(ContactPlane& c) {
+  if (!AllFinite(c.point, c.gap, c.friction, c.other_velocity, c.other_inverse_mass, c.impulse)) {
+    return DecodeStatus::kNotFinite;
+  }
+  if (c.friction < 0 || c.other_inverse_mass < 0) return DecodeStatus::kRange;
+  return Normalise(c.normal);
+}
+
+DecodeStatus Validate(LocalBody& b) {
+  if (!AllFinite(b.mass, b.position, b.velocity, b.angular_velocity, b.acceleration,
+                 b.angular_acceleration)) {
+    return DecodeStatus::kNotFinite;
+  }
+  for (const double component : b.inertia) {
+    if (!Finite(component)) return DecodeStatus::kNotFinite;
+  }
+  if (b.mass < kLightestLocalBody || b.mass > kHeaviestLocalBody || !IsInertia(b.inertia)) {
+    return DecodeStatus::kRange;
+  }
+  return Normalise(b.orientation);
+}
+
+DecodeStatus ValidateLocalBodies(WorldFrame& m) {
+  if (m.local_body_count > 0 && !IsPeriod(m.local_substep_ns)) return DecodeStatus::kRange;
+  for (std::uint32_t i = 0; i < m.local_body_count; ++i) {
+    LocalBody& b = m.local_bodies[i];
+    for (std::uint32_t j = 0; j < i; ++j) {
+      if (m.local_bodies[j].body == b.body) return DecodeStatus::kIdentity;
+    }
+    if (const auto status = Validate(b); status != DecodeStatus::kOk) return status;
+    for (std::uint32_t j = 0; j < b.contact_count; ++j) {
+      if (const auto status = Validate(b.contacts[j]); status != DecodeStatus::kOk) return status;
+    }
+  }
+  return DecodeStatus::kOk;
+}
+
+}  // namespace
+
 DecodeStatus Validate(WorldFrame& m) noexcept {
   if (!IsCoupling(m.coupling)) return DecodeStatus::kEnumerator;
   if (m.frame == 0 || !IsPeriod(m.period_ns)) return DecodeStatus::kRange;
@@ -119,11 +178,17 @@ DecodeStatus Validate(WorldFrame& m) noexcept {
   for (std::uint32_t i = 0; i < m.plane_count; ++i) {
     Plane& p = m.planes[i];
     if (p.pointer >= kMaxPointers) return DecodeStatus::kIdentity;
-    if (!AllFinite(p.point, p.stiffness, p.damping)) return DecodeStatus::kNotFinite;
-    if (p.stiffness < 0 || p.damping < 0) return DecodeStatus::kRange;
+    if (!AllFinite(p.point, p.stiffness, p.damping, p.velocity, p.static_friction,
+                   p.dynamic_friction, p.recovery_s)) {
+      return DecodeStatus::kNotFinite;
+    }
+    if (p.stiffness < 0 || p.damping < 0 || p.static_friction < 0 || p.dynamic_friction < 0 ||
+        p.recovery_s < 0 || p.recovery_s > kLongestRecovery) {
+      return DecodeStatus::kRange;
+    }
     if (const auto status = Normalise(p.normal); status != DecodeStatus::kOk) return status;
   }
-  return DecodeStatus::kOk;
+  return ValidateLocalBodies(m);
 }
 
 DecodeStatus Validate(HapticHealth& m) noexcept {
@@ -131,6 +196,9 @@ DecodeStatus Validate(HapticHealth& m) noexcept {
   if (!AllFinite(m.largest_force, m.largest_force_step, m.slew_limit, m.target)) {
     return DecodeStatus::kNotFinite;
   }
+  const Reconciliation& r = m.reconciliation;
+  if (!AllFinite(r.newest_jump, r.largest_jump)) return DecodeStatus::kNotFinite;
+  if (r.newest_jump < 0 || r.largest_jump < 0) return DecodeStatus::kRange;
   return IsPeriod(m.period_ns) ? DecodeStatus::kOk : DecodeStatus::kRange;
 }
 
@@ -145,6 +213,55 @@ DecodeStatus Validate(Body& b) noexcept {
     return DecodeStatus::kNotFinite;
   if (b.mass < 0) return DecodeStatus::kRange;
   return Normalise(b.orientation);
+}
+
+namespace {
+
+/// How many of a shape's dimensions count; the others mean nothing.
+std::size_t DimensionsOf(ShapeType shape) {
+  switch (shape) {
+    case ShapeType::kSphere:
+      return 1;
+    case ShapeType::kCylinder:
+    case ShapeType::kCapsule:
+      return 2;
+    default:
+      return 3;
+  }
+}
+
+DecodeStatus Validate(SceneCollider& c) {
+  if (c.shape < ShapeType::kBox || c.shape > ShapeType::kMesh) return DecodeStatus::kEnumerator;
+  if (!AllFinite(c.dimensions, c.position)) return DecodeStatus::kNotFinite;
+  for (const double component : c.colour) {
+    if (!Finite(component)) return DecodeStatus::kNotFinite;
+    if (component < 0 || component > 1) return DecodeStatus::kRange;
+  }
+  if (c.shape == ShapeType::kHalfSpace) {
+    if (const auto status = Normalise(c.dimensions); status != DecodeStatus::kOk) return status;
+  } else {
+    for (std::size_t i = 0; i < DimensionsOf(c.shape); ++i) {
+      // A capsule without length is a sphere.
+      const bool may_vanish = c.shape == ShapeType::kCapsule && i == 1;
+      const double dimension = c.dimensions[i];
+      if (!(dimension > 0) && !(may_vanish && dimension == 0)) return DecodeStatus::kRange;
+    }
+  }
+  return Normalise(c.orientation);
+}
+
+}  // namespace
+
+DecodeStatus Validate(WorldScene& m) noexcept {
+  if (!Finite(m.gravity)) return DecodeStatus::kNotFinite;
+  if (m.revision == 0 || (m.needs & m.left_out) != 0) return DecodeStatus::kRange;
+  for (const SceneBody& body : m.bodies) {
+    if (body.fixed > 1) return DecodeStatus::kEnumerator;
+  }
+  for (SceneCollider& collider : m.colliders) {
+    if (const auto status = Validate(collider); status != DecodeStatus::kOk) return status;
+  }
+  return DecodeStatus::kOk;
 }
 
 }  // namespace rikiseki::protocol

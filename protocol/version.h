@@ -8,9 +8,9 @@
 namespace rikiseki::protocol {
 
 inline constexpr std::uint16_t kVersionMajor = 0;
-inline constexpr std::uint16_t kVersionMinor = 1;
+inline constexpr std::uint16_t kVersionMinor = 2;
 
 /// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
-inline constexpr std::uint64_t kLayoutHash = 0x7F44583709F045DAULL;
+inline constexpr std::uint64_t kLayoutHash = 0xE6EFB47136B26316ULL;
 
 }  // namespace rikiseki::protocol

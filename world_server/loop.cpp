@@ -35,18 +35,21 @@ WorldLoop::WorldLoop(const Settings& settings, WorldStep& step, protocol::Segmen
 
 void WorldLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) {
   loop_health_.missed += static_cast<std::uint64_t>(missed);
+  // Asked before the ledger is drained: who is on offer then has a predecessor that publishes no more.
+  // Asked after it, a stop in between could lose the predecessor's last ticks.
+  const bool has_next = link_.HasNext();
   const bool fresh = DrainLedger();
   WatchPeer(now_ns, fresh);
   step_.Tick(TimeToAdvance(now_ns, missed), frame_);
   Publish(now_ns, deadline_ns);
   // Only after a frame has acknowledged the last tick of the old haptic epoch: it stays delivered.
-  if (link_.HasNext()) TakeNextPeer();
+  if (has_next) TakeNextPeer();
 }
 
 bool WorldLoop::DrainLedger() {
   bool fresh = false;
   while (true) {
-    const protocol::ReadStatus status = ticks_.ReadNext(tick_);
+    const protocol::ReadStatus status = ticks_.ReadNext(tick_, static_cast<std::uint64_t>(MonotonicNow()));
     if (status == protocol::ReadStatus::kFresh) {
       step_.Consume(tick_);
       newest_tick_ns_ = static_cast<std::int64_t>(tick_.start_ns + tick_.period_ns);

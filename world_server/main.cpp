@@ -12,6 +12,7 @@
 #include "common/version.h"
 #include "world_server/loop.h"
 #include "world_server/physics/bullet_world.h"
+#include "world_server/scene/scene_message.h"
 #include "world_server/scene/sdf_loader.h"
 
 namespace {
@@ -36,10 +37,32 @@ ReadyScene Load(const Settings& settings) {
   return ready;
 }
 
+// Tells observers of every scene that runs, once.
+class SceneAnnouncer {
+ public:
+  explicit SceneAnnouncer(const protocol::SegmentOwner& owner)
+      : writer_(owner.Stream(protocol::StreamType::kWorldScene)) {}
+
+  void Publish(const Scene& scene, const WorldStep& step) {
+    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_);
+    if (!writer_.Publish(message, static_cast<std::uint64_t>(MonotonicNow()))) {
+      spdlog::warn(
+          "scene {} has grown beyond the room in world.scene: observers see the old shapes "
+          "until world_server is restarted",
+          scene.name);
+    }
+  }
+
+ private:
+  protocol::SceneWriter writer_;
+  std::uint64_t revision_ = 0;
+};
+
 // Reads the scene again beside the running loop: parsing takes many world ticks.
 class SceneReload {
  public:
-  explicit SceneReload(const Settings& settings) : settings_(settings) {}
+  SceneReload(const Settings& settings, SceneAnnouncer& announcer)
+      : settings_(settings), announcer_(announcer) {}
 
   /// A second request while one is under way starts another after it.
   void Request() { ++requests_; }
@@ -54,6 +77,7 @@ class SceneReload {
         spdlog::info("scene {} loaded anew: {} bodies", ready.loaded.scene.name,
                      ready.loaded.scene.bodies.size());
         step.Replace(ready.loaded.scene, std::move(ready.dynamics));
+        announcer_.Publish(ready.loaded.scene, step);
       } catch (const std::exception& error) {
         spdlog::error("the scene stays as it was: {}", error.what());
       }
@@ -66,13 +90,14 @@ class SceneReload {
 
  private:
   const Settings& settings_;
+  SceneAnnouncer& announcer_;
   int requests_ = 0;
   std::future<ReadyScene> loading_;
 };
 
 void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
-                     protocol::PeerLink& link) {
-  SceneReload reload(settings);
+                     protocol::PeerLink& link, SceneAnnouncer& announcer) {
+  SceneReload reload(settings, announcer);
   PeriodicSchedule schedule(MonotonicNow(), settings.period_ns());
   std::int64_t missed = 0;
   while (true) {
@@ -113,12 +138,17 @@ int Run(int argc, char** argv) {
   }
   BlockSignals();
   const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
+  std::uint32_t colliders = 0;
+  for (const SceneBody& body : scene.bodies) {
+    colliders += static_cast<std::uint32_t>(body.colliders.size());
+  }
   const auto body_room = std::max(kBodyRoom, static_cast<std::uint32_t>(scene.bodies.size()));
-  protocol::SegmentOwner owner({.instance = options.instance,
-                                .role = protocol::Role::kWorld,
-                                .streams = protocol::WorldStreams(period_ns, body_room, period_ns),
-                                .build = kBuild,
-                                .runtime_directory = ""});
+  protocol::SegmentOwner owner(
+      {.instance = options.instance,
+       .role = protocol::Role::kWorld,
+       .streams = protocol::WorldStreams(period_ns, body_room, period_ns, colliders),
+       .build = kBuild,
+       .runtime_directory = ""});
   for (const std::string& note : owner.notes()) spdlog::info("{}", note);
   protocol::PeerLink link({.peer = {.instance = options.instance,
                                     .role = protocol::Role::kHaptic,
@@ -128,7 +158,9 @@ int Run(int argc, char** argv) {
   WorldLoop loop(settings, step, owner, link);
   spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(),
                settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
-  RunUntilStopped(settings, step, loop, link);
+  SceneAnnouncer announcer(owner);
+  announcer.Publish(scene, step);
+  RunUntilStopped(settings, step, loop, link, announcer);
   spdlog::info("stopped");
   return kExitOk;
 }

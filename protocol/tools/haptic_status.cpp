@@ -177,8 +177,9 @@ void PrintWorld(const Json& world) {
       break;
     }
     const double mass = body["mass_kg"];
-    std::cout << "  body " << body["body"] << "." << body["generation"] << "   at "
-              << Vector3(body["position_m"], 1e3, 2) << " mm, moving "
+    std::cout << "  body " << body["body"] << "." << body["generation"];
+    if (!body["name"].is_null()) std::cout << " " << body["name"].get<std::string>();
+    std::cout << "   at " << Vector3(body["position_m"], 1e3, 2) << " mm, moving "
               << Vector3(body["velocity_m_per_s"], 1e3, 1) << " mm/s, "
               << (mass > 0 ? Number(mass, 4) + " kg" : "fixed") << "\n";
   }

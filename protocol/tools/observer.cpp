@@ -74,9 +74,20 @@ Json Reported(const Channel& channel) {
           {"angular_impulse", channel.angular_impulse}};
 }
 
-Json Reported(const Body& body) {
+/// The scene's name of a body; null if the scene does not know it.
+Json NameOf(const WorldScene& scene, const Body& body) {
+  for (const SceneBody& known : scene.bodies) {
+    if (known.body == body.body && known.generation == body.generation) {
+      return Printable(known.name.data(), known.name.size());
+    }
+  }
+  return nullptr;
+}
+
+Json Reported(const WorldScene& scene, const Body& body) {
   return {{"body", body.body},
           {"generation", body.generation},
+          {"name", NameOf(scene, body)},
           {"mass_kg", body.mass},
           {"position_m", body.position},
           {"orientation_wxyz", body.orientation},
@@ -122,6 +133,8 @@ void Observer::Refresh(Side& side) {
   if (&side == &world_) {
     bodies_ = side.view == nullptr ? BodiesReader()
                                    : BodiesReader(side.view->Stream(StreamType::kWorldBodies));
+    scene_ = side.view == nullptr ? SceneReader()
+                                  : SceneReader(side.view->Stream(StreamType::kWorldScene));
   }
 }
 
@@ -182,6 +195,9 @@ Json Observer::Haptic(std::uint64_t now_ns, Json& books) {
     report["lateness_us"] = Durations(health.lateness);
     report["duration_us"] = Durations(health.duration);
     report["scheduling"] = Scheduled(health.scheduling);
+    report["reconciliation"] = {{"frames", health.reconciliation.frames},
+                                {"newest_jump_mm", health.reconciliation.newest_jump * 1e3},
+                                {"largest_jump_mm", health.reconciliation.largest_jump * 1e3}};
     report["page_faults"] = {{"minor", health.minor_faults}, {"major", health.major_faults}};
   }
   HapticTick tick;
@@ -247,8 +263,9 @@ Json Observer::World(std::uint64_t now_ns) {
                         {"planes", frame.plane_count}};
   }
   bodies_.ReadLatest();
+  scene_.ReadLatest();
   Json& bodies = report["bodies"] = Json::array();
-  for (const Body& body : bodies_.bodies()) bodies.push_back(Reported(body));
+  for (const Body& body : bodies_.bodies()) bodies.push_back(Reported(scene_.scene(), body));
   return report;
 }
 

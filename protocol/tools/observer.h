@@ -43,6 +43,7 @@ class Observer {
   Side haptic_;
   Side world_;
   BodiesReader bodies_;
+  SceneReader scene_;
 };
 
 }  // namespace rikiseki::protocol

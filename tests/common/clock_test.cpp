@@ -41,6 +41,20 @@ TEST_CASE("missed deadlines are skipped and counted, and the grid is kept") {
   CHECK(schedule.deadline_ns() == 13000);
 }
 
+TEST_CASE(
+    "deadlines that were slept through are known when the sleep ends, and not counted twice") {
+  PeriodicSchedule schedule(0, 1000);
+  CHECK(schedule.WakeUp(1000) == 0);
+  CHECK(schedule.WakeUp(1999) == 0);
+  CHECK(schedule.deadline_ns() == 1000);
+  CHECK(schedule.WakeUp(8500) == 7);  // those of 1000 to 7000; the one of 8000 is worked on now
+  CHECK(schedule.deadline_ns() == 8000);
+  CHECK(schedule.Advance(8600) == 0);
+  CHECK(schedule.deadline_ns() == 9000);
+  CHECK(schedule.WakeUp(8999) == 0);  // a sleep never ends early; if it did, nothing is skipped
+  CHECK(schedule.deadline_ns() == 9000);
+}
+
 TEST_CASE("whatever the lateness, the next deadline lies ahead and all are accounted for") {
   for (std::int64_t late = 0; late < 12000; late += 7) {
     PeriodicSchedule schedule(0, 1000);

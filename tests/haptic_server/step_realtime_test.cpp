@@ -73,7 +73,7 @@ TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") 
     touched = touched || message.pointers[0].reason == protocol::ForceReason::kContact;
   }
   const long allocations_before = Allocations();
-  step.Stop(message);
+  step.Stop(static_cast<std::int64_t>(message.start_ns) + 1'000'000, message);
   allocated += Allocations() - allocations_before;
   REQUIRE(touched);
   REQUIRE(allocated == 0);

@@ -222,8 +222,12 @@ TEST_CASE("Stop lets go and says so; the books take no more") {
   Bench bench;
   bench.Run(400);
   const std::uint64_t tick = bench.message.tick;
-  bench.step.Stop(bench.message);
+  // The loop was told 0.3 ms after its last tick: so long was the last force held.
+  const std::int64_t last_start_ns = bench.now_ns - bench.previous_ns;
+  bench.step.Stop(last_start_ns + 300'000, bench.message);
   REQUIRE(bench.device.released);
+  REQUIRE(bench.message.start_ns == static_cast<std::uint64_t>(last_start_ns + 300'000));
+  REQUIRE(bench.message.previous_duration_ns == 300'000);
   REQUIRE(bench.message.tick == tick + 1);
   REQUIRE(bench.message.pointers[0].reason == ForceReason::kStopped);
   REQUIRE(ToVec3(bench.message.pointers[0].force).isZero(0));

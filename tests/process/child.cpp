@@ -50,6 +50,13 @@ void Child::Signal(int signal) const {
   if (!ended_) kill(pid_, signal);
 }
 
+void Child::Freeze() const {
+  if (ended_) return;
+  Signal(SIGSTOP);
+  siginfo_t info{};
+  waitid(P_PID, static_cast<id_t>(pid_), &info, WSTOPPED | WEXITED | WNOWAIT);
+}
+
 bool Child::IsRunning() {
   if (ended_) return false;
   if (waitpid(pid_, &status_, WNOHANG) != pid_) return true;

@@ -19,6 +19,11 @@ class Child {
 
   void Signal(int signal) const;
 
+  /// SIGSTOP, and waits until it stands still (or has ended).
+  void Freeze() const;
+
+  pid_t pid() const { return pid_; }
+
   /// Waits until it ends, `seconds` at most, then kills it. Returns the exit status, or minus the signal
   /// that ended it.
   int Wait(double seconds = 20);

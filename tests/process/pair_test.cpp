@@ -126,7 +126,8 @@ TEST_CASE("the pair couples in both orders of start and delivers what it display
     const auto haptic_view = Observe(instance, Role::kHaptic);
     const auto world_view = Observe(instance, Role::kWorld);
     REQUIRE(WaitForPush(watch));
-    CHECK(ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive);
+    CHECK(
+        Eventually([&] { return ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive; }));
     CHECK(Eventually([&] { return Norm(ReadWorldHealth(*world_view).applied) > 0.05; }));
     CheckNotKicked(*world_view);
     REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
@@ -179,7 +180,7 @@ TEST_CASE(
   Child second(WorldCommand(instance));
   const auto world_view = Observe(instance, Role::kWorld);
   REQUIRE(WaitForPush(watch));
-  CHECK(ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive);
+  CHECK(Eventually([&] { return ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive; }));
   CheckNotKicked(*world_view);
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
   CheckBooks(*haptic_view);

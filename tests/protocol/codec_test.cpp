@@ -19,8 +19,8 @@ using test::Generator;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-using Words = std::array<std::uint64_t, 600>;
-static_assert(sizeof(Words) >= kHapticHealthBytes);
+using Words = std::array<std::uint64_t, 1700>;
+static_assert(sizeof(Words) >= kWorldFrameBytes && sizeof(Words) >= kHapticHealthBytes);
 
 template <typename Message>
 void CheckRoundTrip(const Message& message) {
@@ -80,9 +80,43 @@ TEST_CASE("a message is as long as what it uses") {
   WorldFrame frame;
   CHECK(Encode(frame, words).used_bytes == 104);
   frame.plane_count = kMaxPlanes;
-  CHECK(Encode(frame, words).used_bytes == 104 + 32 * 64);
+  std::uint32_t bytes = 104 + 32 * 64;
+  CHECK(Encode(frame, words).used_bytes == bytes);
+  const auto grows_by = [&](std::uint32_t more, std::uint32_t blocks) {
+    bytes += more;
+    CHECK(Encode(frame, words).used_bytes == bytes);
+    CHECK(Encode(frame, words).blocks == blocks);
+  };
   frame.planes[31].stiffness = 1;
+  grows_by(32 * 16, kFrameSurfaces);
+  frame.planes[7].velocity[1] = 1;
+  grows_by(32 * 24, kFrameSurfaces | kFrameVelocities);
+  frame.planes[0].dynamic_friction = 1;
+  grows_by(32 * 16, kFrameSurfaces | kFrameVelocities | kFrameFriction);
+  frame.planes[31].recovery_s = 1;
+  grows_by(32 * 8, kFrameSurfaces | kFrameVelocities | kFrameFriction | kFrameRecovery);
+  frame.local_body_count = 1;
+  grows_by(16 + 224, 31);
+  frame.local_bodies[0].contact_count = 1;
+  grows_by(128, 31);
+  frame.local_body_count = kMaxLocalBodies;
+  for (LocalBody& body : frame.local_bodies) body.contact_count = kMaxContactPlanes;
   CHECK(Encode(frame, words).used_bytes == kWorldFrameBytes);
+  HapticHealth health;
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24);
+  health.reconciliation.frames = 1;
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes);
+  WorldScene scene;
+  CHECK(Encode(scene, words).used_bytes == 120);
+  scene.bodies.resize(2);
+  scene.bodies[1].collider_count = 1;
+  scene.colliders.resize(1);
+  CHECK(Encode(scene, words).used_bytes == 120 + 2 * 80 + 120);
+  CHECK(Encode(scene, words).blocks == 0);
+  scene.colliders[0].shape = ShapeType::kMesh;
+  scene.meshes.resize(1);
+  CHECK(Encode(scene, words).used_bytes == 120 + 2 * 80 + 120 + 256);
+  CHECK(Encode(scene, words).blocks == kSceneMeshes);
 }
 
 TEST_CASE("fields lie where SPEC.md section 6 puts them") {
@@ -110,13 +144,26 @@ TEST_CASE("fields lie where SPEC.md section 6 puts them") {
   CHECK(at(80 + 2 * 88 + 144 + 2 * 80 + 16, std::int64_t{}) == 10);  // ground, J z
   WorldFrame frame = Generator(4).Frame();
   frame.plane_count = 2;
-  frame.planes[1] = {3, 4, 5, 6, {7, 8, 9}, {0, 0, 1}, 10, 11};
+  frame.planes[1] = {3, 4, 5, 6, {7, 8, 9}, {0, 0, 1}, 10, 11, {12, 13, 14}, 15, 16, 17};
+  frame.local_body_count = 2;
+  frame.local_bodies[0].contact_count = 1;
+  frame.local_bodies[1].contact_count = 2;
+  frame.local_bodies[1].mass = 18;
+  frame.local_bodies[1].contacts[1].gap = 19;
   Encode(frame, words);
   CHECK(at(32, std::uint64_t{}) == frame.acked_tick);
   CHECK(at(100, std::uint32_t{}) == 2);
   CHECK(at(104 + 64 + 12, std::uint32_t{}) == 6);
   CHECK(at(104 + 64 + 56, double{}) == 1);
   CHECK(at(104 + 2 * 64 + 16 + 8, double{}) == 11);
+  const std::size_t velocities = 104 + 2 * 64 + 2 * 16;
+  CHECK(at(velocities + 24 + 16, double{}) == 14);
+  CHECK(at(velocities + 2 * 24 + 16, double{}) == 15);
+  CHECK(at(velocities + 2 * 24 + 2 * 16 + 8, double{}) == 17);
+  const std::size_t local = velocities + 2 * 24 + 2 * 16 + 2 * 8;
+  CHECK(at(local, std::uint32_t{}) == 2);
+  CHECK(at(local + 16 + 224 + 16, double{}) == 18);
+  CHECK(at(local + 16 + 2 * 224 + 2 * 128 + 56, double{}) == 19);  // second contact of the second
 }
 
 TEST_CASE("impossible counts and short buffers are not encoded") {
@@ -130,6 +177,20 @@ TEST_CASE("impossible counts and short buffers are not encoded") {
   WorldFrame frame;
   frame.plane_count = kMaxPlanes + 1;
   CHECK(Encode(frame, words).used_bytes == 0);
+  frame.plane_count = 0;
+  frame.local_body_count = kMaxLocalBodies + 1;
+  CHECK(Encode(frame, words).used_bytes == 0);
+  frame.local_body_count = 1;
+  frame.local_bodies[0].contact_count = kMaxContactPlanes + 1;
+  CHECK(Encode(frame, words).used_bytes == 0);
+  WorldScene scene;
+  scene.bodies.resize(1);
+  scene.bodies[0].collider_count = 1;
+  CHECK(Encode(scene, words).used_bytes == 0);
+  scene.colliders.resize(1);
+  CHECK(Encode(scene, words).used_bytes > 0);
+  scene.colliders[0].shape = ShapeType::kMesh;
+  CHECK(Encode(scene, words).used_bytes == 0);
   const auto short_words = std::span(words).first(9);
   CHECK(Encode(HapticTick{}, short_words).used_bytes == 0);
   CHECK(Encode(WorldFrame{}, short_words).used_bytes == 0);
@@ -228,7 +289,8 @@ TEST_CASE("a nonsensical frame is refused") {
   WorldFrame sound;
   do {
     sound = generator.Frame();
-  } while (sound.plane_count < 2 || sound.planes[0].stiffness == 0);
+  } while (sound.plane_count < 2 || sound.planes[0].stiffness == 0 ||
+           sound.planes[0].recovery_s == 0);
   using S = DecodeStatus;
   CheckRefused<WorldFrame>(
       sound,
@@ -256,7 +318,189 @@ TEST_CASE("a nonsensical frame is refused") {
           {"stiffness < 0", [](auto& m) { m.planes[0].stiffness = -1; }, S::kRange},
           {"damping", [](auto& m) { m.planes[0].damping = kInfinity; }, S::kNotFinite},
           {"damping < 0", [](auto& m) { m.planes[0].damping = -1; }, S::kRange},
+          {"velocity", [](auto& m) { m.planes[1].velocity[2] = kNaN; }, S::kNotFinite},
+          {"friction", [](auto& m) { m.planes[1].static_friction = kNaN; }, S::kNotFinite},
+          {"friction < 0", [](auto& m) { m.planes[1].static_friction = -1; }, S::kRange},
+          {"sliding", [](auto& m) { m.planes[1].dynamic_friction = kInfinity; }, S::kNotFinite},
+          {"sliding < 0", [](auto& m) { m.planes[1].dynamic_friction = -1; }, S::kRange},
+          {"recovery", [](auto& m) { m.planes[1].recovery_s = kNaN; }, S::kNotFinite},
+          {"recovery < 0", [](auto& m) { m.planes[1].recovery_s = -1; }, S::kRange},
+          {"recovery 11 s", [](auto& m) { m.planes[1].recovery_s = 11; }, S::kRange},
       });
+}
+
+TEST_CASE("a nonsensical local body is refused") {
+  Generator generator(14);
+  WorldFrame sound;
+  do {
+    sound = generator.Frame();
+  } while (sound.local_body_count < 2 || sound.local_bodies[1].contact_count < 2);
+  using S = DecodeStatus;
+  const auto body = [](auto spoil) { return [spoil](WorldFrame& m) { spoil(m.local_bodies[1]); }; };
+  const auto contact = [](auto spoil) {
+    return [spoil](WorldFrame& m) { spoil(m.local_bodies[1].contacts[1]); };
+  };
+  using Inertia = std::array<double, 6>;
+  CheckRefused<WorldFrame>(
+      sound,
+      {
+          {"substep 0", [](auto& m) { m.local_substep_ns = 0; }, S::kRange},
+          {"substep 11 s", [](auto& m) { m.local_substep_ns = 11'000'000'000; }, S::kRange},
+          {"body twice", [](auto& m) { m.local_bodies[1].body = m.local_bodies[0].body; },
+           S::kIdentity},
+          {"mass NaN", body([](auto& b) { b.mass = kNaN; }), S::kNotFinite},
+          {"mass 0", body([](auto& b) { b.mass = 0; }), S::kRange},
+          {"mass tiny", body([](auto& b) { b.mass = 1e-10; }), S::kRange},
+          {"mass huge", body([](auto& b) { b.mass = 1e10; }), S::kRange},
+          {"inertia NaN", body([](auto& b) { b.inertia[4] = kNaN; }), S::kNotFinite},
+          {"inertia 0", body([](auto& b) { b.inertia = Inertia{}; }), S::kRange},
+          {"inertia < 0", body([](auto& b) { b.inertia[3] = -1; }), S::kRange},
+          {"inertia flat", body([](auto& b) { b.inertia = Inertia{1, 1, 0, 1, 0, 1}; }), S::kRange},
+          {"inertia indefinite", body([](auto& b) { b.inertia = Inertia{1, 0, 0, 1, 2, 1}; }),
+           S::kRange},
+          {"inertia huge", body([](auto& b) { b.inertia = Inertia{1e308, 0, 0, 1e308, 0, 1e308}; }),
+           S::kRange},
+          {"position", body([](auto& b) { b.position[0] = kNaN; }), S::kNotFinite},
+          {"orientation", body([](auto& b) { b.orientation = Quaternion{}; }), S::kQuaternion},
+          {"velocity", body([](auto& b) { b.velocity[0] = kInfinity; }), S::kNotFinite},
+          {"spin", body([](auto& b) { b.angular_velocity[0] = kNaN; }), S::kNotFinite},
+          {"acceleration", body([](auto& b) { b.acceleration[0] = kNaN; }), S::kNotFinite},
+          {"turning", body([](auto& b) { b.angular_acceleration[0] = kNaN; }), S::kNotFinite},
+          {"point", contact([](auto& c) { c.point[1] = kNaN; }), S::kNotFinite},
+          {"normal zero", contact([](auto& c) { c.normal = Vector{}; }), S::kNormal},
+          {"normal NaN", contact([](auto& c) { c.normal[1] = kNaN; }), S::kNotFinite},
+          {"gap", contact([](auto& c) { c.gap = kInfinity; }), S::kNotFinite},
+          {"friction", contact([](auto& c) { c.friction = kNaN; }), S::kNotFinite},
+          {"friction < 0", contact([](auto& c) { c.friction = -1; }), S::kRange},
+          {"other velocity", contact([](auto& c) { c.other_velocity[1] = kNaN; }), S::kNotFinite},
+          {"other mass", contact([](auto& c) { c.other_inverse_mass = kNaN; }), S::kNotFinite},
+          {"other mass < 0", contact([](auto& c) { c.other_inverse_mass = -1; }), S::kRange},
+          {"impulse", contact([](auto& c) { c.impulse[1] = kNaN; }), S::kNotFinite},
+      });
+}
+
+TEST_CASE("counts within the block of local bodies bound what is read") {
+  Generator generator(15);
+  WorldFrame sound;
+  do {
+    sound = generator.Frame();
+  } while (sound.local_body_count != 2 || sound.local_bodies[1].contact_count < 2);
+  Words words{};
+  const Encoded right = Encode(sound, words);
+  const std::uint32_t contacts_sent =
+      sound.local_bodies[0].contact_count + sound.local_bodies[1].contact_count;
+  const std::uint32_t local = right.used_bytes - 16 - 2 * 224 - 128 * contacts_sent;
+  const auto with = [&](std::uint32_t offset, std::uint32_t value, Encoded encoded) {
+    Words spoiled = words;
+    std::memcpy(reinterpret_cast<char*>(spoiled.data()) + offset, &value, sizeof value);
+    WorldFrame got;
+    return Decode(spoiled, encoded, got);
+  };
+  REQUIRE(with(local, 2, right) == DecodeStatus::kOk);
+  CHECK(with(local, 1, right) == DecodeStatus::kLength);
+  CHECK(with(local, 4, right) != DecodeStatus::kOk);
+  CHECK(with(local, 5, right) == DecodeStatus::kCount);
+  CHECK(with(local, ~0u, right) == DecodeStatus::kCount);
+  const std::uint32_t contacts = local + 16 + 224 + 8;  // of the second body
+  CHECK(with(contacts, 17, right) == DecodeStatus::kCount);
+  CHECK(with(contacts, ~0u, right) == DecodeStatus::kCount);
+  CHECK(with(contacts, 1, right) == DecodeStatus::kLength);
+  for (std::uint32_t bytes = 0; bytes < right.used_bytes; bytes += 8) {
+    WorldFrame got;
+    CHECK(Decode(words, {bytes, right.blocks}, got) == DecodeStatus::kLength);
+    CHECK(Decode(std::span<const std::uint64_t>(words).first(bytes / 8), right, got) ==
+          DecodeStatus::kLength);
+  }
+  // Behind the block that this version knows last, a later one may put more.
+  CHECK(with(local, 2, {right.used_bytes + 40, right.blocks | 32}) == DecodeStatus::kOk);
+}
+
+TEST_CASE("scenes come back as they were sent") {
+  Generator generator(16);
+  for (int i = 0; i < 300; ++i) {
+    const WorldScene scene = generator.Scene();
+    std::vector<std::uint64_t> words(WorldSceneBytes(20, 80, 80) / 8);
+    const Encoded encoded = Encode(scene, words);
+    REQUIRE(encoded.used_bytes > 0);
+    WorldScene got;
+    REQUIRE(Decode(words, encoded, got) == DecodeStatus::kOk);
+    std::vector<std::uint64_t> again(words.size());
+    REQUIRE(Encode(got, again).used_bytes == encoded.used_bytes);
+    REQUIRE(again == words);
+    REQUIRE(got.bodies.size() == scene.bodies.size());
+    REQUIRE(got.meshes.size() == scene.meshes.size());
+    // Without the block, a mesh has no place.
+    if (scene.meshes.empty()) continue;
+    const auto without = static_cast<std::uint32_t>(scene.meshes.size()) * 256;
+    REQUIRE(Decode(words, {encoded.used_bytes - without, 0}, got) == DecodeStatus::kOk);
+    CHECK(got.meshes.size() == scene.meshes.size());
+    CHECK(got.meshes[0].path[0] == 0);
+  }
+}
+
+TEST_CASE("a nonsensical scene is refused") {
+  Generator generator(17);
+  WorldScene sound;
+  do {
+    sound = generator.Scene();
+  } while (sound.bodies.size() < 3 || sound.colliders.size() < 3 || sound.meshes.empty() ||
+           sound.colliders[0].shape == ShapeType::kMesh);
+  std::vector<std::uint64_t> words(WorldSceneBytes(20, 80, 80) / 8);
+  const auto decode = [&](const std::function<void(WorldScene&)>& spoil) {
+    WorldScene spoiled = sound;
+    spoil(spoiled);
+    const Encoded encoded = Encode(spoiled, words);
+    REQUIRE(encoded.used_bytes > 0);
+    WorldScene got;
+    const DecodeStatus status = Decode(words, encoded, got);
+    CHECK((got.revision != 0) == (status == DecodeStatus::kOk));
+    return status;
+  };
+  using S = DecodeStatus;
+  CHECK(decode([](auto&) {}) == S::kOk);
+  CHECK(decode([](auto& m) { m.revision = 0; }) == S::kRange);
+  CHECK(decode([](auto& m) { m.needs = m.left_out = 1; }) == S::kRange);
+  CHECK(decode([](auto& m) { m.gravity[2] = kNaN; }) == S::kNotFinite);
+  CHECK(decode([](auto& m) { m.bodies[1].fixed = 2; }) == S::kEnumerator);
+  CHECK(decode([](auto& m) { m.colliders[0].colour[0] = 1.5; }) == S::kRange);
+  CHECK(decode([](auto& m) { m.colliders[0].colour[3] = kNaN; }) == S::kNotFinite);
+  CHECK(decode([](auto& m) { m.colliders[0].position[0] = kNaN; }) == S::kNotFinite);
+  CHECK(decode([](auto& m) { m.colliders[0].orientation = Quaternion{}; }) == S::kQuaternion);
+  CHECK(decode([](auto& m) { m.colliders[0].dimensions[0] = kInfinity; }) == S::kNotFinite);
+  const auto shaped = [&](ShapeType shape, const Vector& dimensions) {
+    return decode([&](auto& m) {
+      m.colliders[0].shape = shape;
+      m.colliders[0].dimensions = dimensions;
+    });
+  };
+  CHECK(shaped(static_cast<ShapeType>(0), {1, 1, 1}) == S::kEnumerator);
+  CHECK(shaped(static_cast<ShapeType>(8), {1, 1, 1}) == S::kEnumerator);
+  CHECK(shaped(ShapeType::kBox, {1, 1, 1}) == S::kOk);
+  CHECK(shaped(ShapeType::kBox, {1, 1, 0}) == S::kRange);
+  CHECK(shaped(ShapeType::kSphere, {1, 0, 0}) == S::kOk);
+  CHECK(shaped(ShapeType::kSphere, {-1, 0, 0}) == S::kRange);
+  CHECK(shaped(ShapeType::kCylinder, {1, 0, 0}) == S::kRange);
+  CHECK(shaped(ShapeType::kCapsule, {1, 0, 0}) == S::kOk);
+  CHECK(shaped(ShapeType::kCapsule, {1, -1, 0}) == S::kRange);
+  CHECK(shaped(ShapeType::kHalfSpace, {0, 0, 0}) == S::kNormal);
+  CHECK(shaped(ShapeType::kHalfSpace, {0, 0, -2}) == S::kOk);
+
+  // Counts that do not agree, whatever length is said.
+  Encode(sound, words);
+  const auto counted = [&](std::uint32_t bodies, std::uint32_t colliders) {
+    std::vector<std::uint64_t> spoiled = words;
+    spoiled[14] = bodies | static_cast<std::uint64_t>(colliders) << 32;
+    WorldScene got;
+    return Decode(spoiled, {static_cast<std::uint32_t>(words.size() * 8), 1}, got);
+  };
+  const auto bodies = static_cast<std::uint32_t>(sound.bodies.size());
+  const auto colliders = static_cast<std::uint32_t>(sound.colliders.size());
+  CHECK(counted(bodies, colliders) == S::kLength);
+  CHECK(counted(bodies, colliders - 1) == S::kCount);
+  CHECK(counted(kMaxBodies, colliders) == S::kLength);
+  CHECK(counted(kMaxBodies + 1, colliders) == S::kCount);
+  CHECK(counted(bodies, kMaxColliders + 1) == S::kCount);
+  CHECK(counted(~0u, ~0u) == S::kCount);
 }
 
 TEST_CASE("nonsensical health is refused") {
@@ -270,6 +514,16 @@ TEST_CASE("nonsensical health is refused") {
           {"step", [](auto& m) { m.largest_force_step = kNaN; }, S::kNotFinite},
           {"slew", [](auto& m) { m.slew_limit = kInfinity; }, S::kNotFinite},
           {"target", [](auto& m) { m.target[1] = kNaN; }, S::kNotFinite},
+          {"jump",
+           [](auto& m) {
+             m.reconciliation = Reconciliation{1, kNaN, 1};
+           },
+           S::kNotFinite},
+          {"jump < 0",
+           [](auto& m) {
+             m.reconciliation = Reconciliation{1, 1, -1};
+           },
+           S::kRange},
           {"period", [](auto& m) { m.period_ns = 0; }, S::kRange},
       });
   CheckRefused<WorldHealth>(
@@ -389,6 +643,21 @@ bool AllFinite(const WorldFrame& m) {
     sum += (m.planes[i].stiffness + m.planes[i].damping) * 0;
     if (std::abs(std::hypot(n[0], n[1], n[2]) - 1) > 1e-12) return false;
   }
+  for (std::uint32_t i = 0; i < m.local_body_count; ++i) {
+    const LocalBody& b = m.local_bodies[i];
+    if (!(b.mass > 0) || b.contact_count > kMaxContactPlanes) return false;
+    for (const auto& v : {b.position, b.velocity, b.angular_velocity, b.acceleration}) {
+      for (const double x : v) sum += x * 0;
+    }
+    for (const double x : b.inertia) sum += x * 0;
+    for (std::uint32_t j = 0; j < b.contact_count; ++j) {
+      const ContactPlane& c = b.contacts[j];
+      for (const auto& v : {c.point, c.normal, c.other_velocity, c.impulse}) {
+        for (const double x : v) sum += x * 0;
+      }
+      sum += (c.gap + c.friction + c.other_inverse_mass) * 0;
+    }
+  }
   return std::isfinite(sum);
 }
 
@@ -406,7 +675,7 @@ TEST_CASE("whatever the bytes are, what is accepted is finite and within bounds"
       frame_words = words;
       words[9] = (random() % 18) << 32 | random() % 6;
       tick_encoded = {static_cast<std::uint32_t>(random() % 600 * 8),
-                      static_cast<std::uint32_t>(random() % 4)};
+                      static_cast<std::uint32_t>(random() % 32)};
       frame_encoded = tick_encoded;
     } else {
       // A few bits flipped, the exponents' above all.
@@ -426,6 +695,7 @@ TEST_CASE("whatever the bytes are, what is accepted is finite and within bounds"
     if (Decode(frame_words, frame_encoded, frame) == DecodeStatus::kOk) {
       ++accepted;
       REQUIRE(frame.plane_count <= kMaxPlanes);
+      REQUIRE(frame.local_body_count <= kMaxLocalBodies);
       REQUIRE(AllFinite(frame));
     }
   }

@@ -70,7 +70,7 @@ TEST_CASE("the tables of SPEC.md are the layout") {
     expected[parts[0].substr(0, dot)] +=
         parts[0].substr(dot + 1) + ":" + parts[1] + ":" + parts[2] + "\n";
   }
-  CHECK(expected.size() == 12);
+  CHECK(expected.size() == 23);
 
   std::map<std::string, std::string> rows;
   std::istringstream spec(ReadFile("protocol/SPEC.md"));
@@ -88,6 +88,42 @@ TEST_CASE("the tables of SPEC.md are the layout") {
     }
   }
   CHECK(rows == expected);
+}
+
+/// "7.2-3" of a line "- [7.2-3] ...", else empty.
+std::string SentenceNumber(const std::string& line) {
+  if (line.rfind("- [", 0) != 0) return "";
+  return line.substr(3, line.find(']') - 3);
+}
+
+TEST_CASE("every demand of SPEC.md has a number in its section, given once and in order") {
+  std::istringstream spec(ReadFile("protocol/SPEC.md"));
+  std::string section;
+  std::string sentence;  // the number of the list item that a line belongs to
+  int last = 0;
+  int sentences = 0;
+  for (std::string line; std::getline(spec, line);) {
+    INFO(line);
+    if (line.rfind("#", 0) == 0) {
+      const auto begin = line.find(' ') + 1;
+      section = line.substr(begin, line.find(' ', begin) - begin);
+      if (section.back() == '.') section.pop_back();
+      last = 0;
+    }
+    if (const std::string number = SentenceNumber(line); !number.empty()) {
+      const auto dash = number.find('-');
+      CHECK(number.substr(0, dash) == section);
+      CHECK(std::stoi(number.substr(dash + 1)) == ++last);
+      sentence = number;
+      ++sentences;
+    } else if (line.rfind("  ", 0) != 0) {
+      sentence.clear();
+    }
+    const bool demands =
+        line.find("MUST") != std::string::npos || line.find("SHOULD") != std::string::npos;
+    if (demands && line.find("RFC 2119") == std::string::npos) CHECK(!sentence.empty());
+  }
+  CHECK(sentences > 100);
 }
 
 TEST_CASE("SPEC.md and CHANGELOG.md name the hash") {

@@ -140,6 +140,7 @@ HapticHealth Generator::Haptic() {
   for (char& c : m.device) c = static_cast<char>('a' + Integer(25));
   for (auto& count : m.lateness) count = engine_();
   for (auto& count : m.duration) count = engine_();
+  if (Integer(1) == 1) m.reconciliation = {1 + Integer(99), Positive(), Positive()};
   return m;
 }
 
@@ -157,10 +158,73 @@ WorldFrame Generator::Frame() {
   m.plane_count = Small(kMaxPlanes);
   const bool own_surfaces = Integer(1) == 1;
   for (std::uint32_t i = 0; i < m.plane_count; ++i) {
-    m.planes[i] = {Small(3), Small(99), Small(99), Small(0xFFFFFFFF), Triple(), Direction(), 0, 0};
+    m.planes[i] = {Small(3), Small(99), Small(99), Small(0xFFFFFFFF), Triple(), Direction()};
     if (own_surfaces) {
       m.planes[i].stiffness = Positive();
       m.planes[i].damping = Positive();
+    }
+  }
+  const bool rubbing = Integer(1) == 1;
+  for (std::uint32_t i = 0; rubbing && i < m.plane_count; ++i) {
+    m.planes[i].velocity = Triple();
+    m.planes[i].static_friction = Positive();
+    m.planes[i].dynamic_friction = Positive();
+    m.planes[i].recovery_s = Positive();
+  }
+  if (Integer(1) == 1) {
+    m.local_body_count = 1 + Small(kMaxLocalBodies - 1);
+    m.local_substep_ns = 1 + Integer(10'000'000);
+    for (std::uint32_t i = 0; i < m.local_body_count; ++i) m.local_bodies[i] = OneLocalBody(i);
+  }
+  return m;
+}
+
+LocalBody Generator::OneLocalBody(std::uint32_t body) {
+  LocalBody b;
+  b.body = body;
+  b.generation = Small(99);
+  b.mass = 0.001 + Positive();
+  b.inertia = {20 + Positive(), Real(), Real() / 2, 30 + Positive(), Real() / 4, 40 + Positive()};
+  b.position = Triple();
+  b.orientation = Orientation();
+  b.velocity = Triple();
+  b.angular_velocity = Triple();
+  b.acceleration = Triple();
+  b.angular_acceleration = Triple();
+  b.contact_count = Small(kMaxContactPlanes);
+  for (std::uint32_t i = 0; i < b.contact_count; ++i) {
+    b.contacts[i] = {Small(99),  Small(99), Triple(),   Direction(), Real(),
+                     Positive(), Triple(),  Positive(), Triple()};
+  }
+  return b;
+}
+
+WorldScene Generator::Scene() {
+  WorldScene m;
+  m.revision = 1 + Integer(1000);
+  m.needs = Integer(kAllSceneNeeds);
+  m.left_out = ~m.needs & kAllSceneNeeds;
+  m.gravity = Triple();
+  for (char& c : m.name) c = static_cast<char>('a' + Integer(25));
+  m.bodies.resize(Small(20));
+  for (SceneBody& body : m.bodies) {
+    body = {Small(99), Small(99), Small(1), Small(3), {}};
+    for (char& c : body.name) c = static_cast<char>('a' + Integer(25));
+    for (std::uint32_t i = 0; i < body.collider_count; ++i) {
+      SceneCollider c;
+      c.shape = static_cast<ShapeType>(1 + Integer(6));
+      c.position = Triple();
+      c.orientation = Orientation();
+      for (double& component : c.colour) component = static_cast<double>(Integer(8)) / 8;
+      for (double& dimension : c.dimensions) dimension = 0.001 + Positive();
+      if (c.shape == ShapeType::kHalfSpace) c.dimensions = Direction();
+      if (c.shape == ShapeType::kMesh) {
+        SceneMesh mesh;
+        for (auto& byte : mesh.sha256) byte = static_cast<std::uint8_t>(Integer(255));
+        for (char& letter : mesh.path) letter = static_cast<char>('a' + Integer(25));
+        m.meshes.push_back(mesh);
+      }
+      m.colliders.push_back(c);
     }
   }
   return m;

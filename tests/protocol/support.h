@@ -64,6 +64,8 @@ class Generator {
   WorldFrame Frame();
   WorldHealth World();
   Body OneBody();
+  LocalBody OneLocalBody(std::uint32_t body);
+  WorldScene Scene();
 
  private:
   std::mt19937_64 engine_;

@@ -1,0 +1,69 @@
+#include "world_server/scene/scene_message.h"
+
+#include <algorithm>
+#include <string>
+
+namespace rikiseki::world {
+namespace {
+
+using protocol::SceneCollider;
+using protocol::ShapeType;
+
+std::array<char, 64> Padded(const std::string& name) {
+  std::array<char, 64> text{};
+  std::copy_n(name.begin(), std::min(name.size(), text.size() - 1), text.begin());
+  return text;
+}
+
+void Describe(const Box& box, SceneCollider& c) {
+  c.shape = ShapeType::kBox;
+  c.dimensions = ToArray(box.half_extents);
+}
+void Describe(const Sphere& sphere, SceneCollider& c) {
+  c.shape = ShapeType::kSphere;
+  c.dimensions = {sphere.radius, 0, 0};
+}
+void Describe(const HalfSpace& half_space, SceneCollider& c) {
+  c.shape = ShapeType::kHalfSpace;
+  c.dimensions = ToArray(half_space.normal);
+}
+void Describe(const Cylinder& cylinder, SceneCollider& c) {
+  c.shape = ShapeType::kCylinder;
+  c.dimensions = {cylinder.radius, cylinder.half_length, 0};
+}
+void Describe(const Capsule& capsule, SceneCollider& c) {
+  c.shape = ShapeType::kCapsule;
+  c.dimensions = {capsule.radius, capsule.half_length, 0};
+}
+void Describe(const Ellipsoid& ellipsoid, SceneCollider& c) {
+  c.shape = ShapeType::kEllipsoid;
+  c.dimensions = ToArray(ellipsoid.radii);
+}
+
+}  // namespace
+
+protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol::Body> bodies,
+                                   std::uint64_t revision) {
+  protocol::WorldScene message;
+  message.revision = revision;
+  message.gravity = ToArray(scene.gravity);
+  message.name = Padded(scene.name);
+  bool moving = false;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const SceneBody& body = scene.bodies[i];
+    moving = moving || !body.fixed;
+    message.bodies.push_back({bodies[i].body, bodies[i].generation, body.fixed ? 1u : 0u,
+                              static_cast<std::uint32_t>(body.colliders.size()),
+                              Padded(body.name)});
+    for (const Collider& collider : body.colliders) {
+      SceneCollider& c = message.colliders.emplace_back();
+      std::visit([&c](const auto& shape) { Describe(shape, c); }, collider.shape);
+      c.position = ToArray(collider.pose_BS.position);
+      c.orientation = ToArray(collider.pose_BS.orientation);
+    }
+  }
+  (moving ? message.needs : message.left_out) |= protocol::kNeedMovingBodies;
+  return message;
+}
+
+}  // namespace rikiseki::world
