@@ -29,9 +29,7 @@ void PublishMessage(check::RawWriter& writer, const Message& message, bool befor
   if (before_write) {
     std::atomic_ref<std::uint64_t>(*writer.ring().published)
         .store(writer.published() + 1, std::memory_order_release);
-    const std::int64_t until = MonotonicNow() + 20'000;
-    while (MonotonicNow() < until) {
-    }
+    SleepUntil(MonotonicNow() + 100'000);
   }
   writer.Publish(words, shape, now);
 }

@@ -98,6 +98,8 @@ struct Haptic {
   // The device.
   Vector position{-0.05, 0, 0};
   Vector displayed_force{};
+  GroundChannel ground;
+  std::array<double, 3> ground_rest{};
   double gain = 0;
 
   // The books.
@@ -270,12 +272,16 @@ void Haptic::Tick(std::int64_t now) {
   previous_start = now;
   LookForWorld(now);
   WorldFrame fresh;
+  Vector orphan{};
   const bool is_fresh = ReadFrame(fresh);
   if (is_fresh) TakeAck(fresh);
   WatchWorld(now, is_fresh);
   if (is_fresh && live) {
     if (channel_epoch != view_epoch) {
-      if (fault != HapticFault::kKeepsChannels) accounts.clear();
+      if (fault != HapticFault::kKeepsChannels) {
+        for (const Account& account : accounts) orphan = Sum(orphan, account.force);
+        accounts.clear();
+      }
       channel_epoch = view_epoch;
     }
     frame = fresh;
@@ -285,6 +291,8 @@ void Haptic::Tick(std::int64_t now) {
   for (const Account& account : accounts) {
     before[check::KeyOf(account.channel)] = {account.force, account.point};
   }
+  // What was displayed for a channel that is free now is corrected for nobody.
+  ground.impulse = Plus(ground.impulse, Quantise(Scaled(orphan, correction_s), ground_rest));
   const Vector force = Render();
   if (!live && gain <= 0) shown_epoch = 0;
   position = Sum(position, Scaled(Difference(Sum({-0.05, 0, 0}, Scaled(force, 1 / kHandStiffness)),
@@ -357,6 +365,7 @@ void Haptic::Publish(std::int64_t now, std::int64_t duration) {
                                : Norm(displayed_force) > 0   ? ForceReason::kContact
                                : accounts.size() == kMaxChannels ? ForceReason::kNoChannel
                                                              : ForceReason::kNoContact;
+  message.ground = ground;
   for (const Account& account : accounts) {
     message.channels[message.channel_count++] = account.channel;
   }

@@ -382,7 +382,11 @@ void LastWords(HapticPlayer& player, bool cleanly, const char* what) {
 }
 
 void Restarts(HapticPlayer& player) {
-  LastWords(player, false, "the haptic side died and started again");
+  // At whatever moment between two frames it happens.
+  for (int i = 0; i < 3; ++i) {
+    LastWords(player, false, "the haptic side died and started again");
+    player.Run(0.007 * i);
+  }
 }
 void Closes(HapticPlayer& player) {
   LastWords(player, true, "the haptic side closed and started again");
