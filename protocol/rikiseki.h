@@ -6,9 +6,10 @@
  *
  * A peer in short (a whole one is tests/protocol/rikiseki_h_world.c):
  *
- *   own side   rk_create, rk_writer_of;  each tick: rk_encode_*, rk_publish, rk_heartbeat, rk_report; rk_close
+ *   own side   rk_create, rk_writer_of;  each tick: rk_encode_*, rk_publish, rk_heartbeat, rk_report;
+ *              rk_close
  *   other side rk_attach (every 100 ms while detached, not in a thread with deadlines),
- *              rk_reader_of;  each tick: rk_state, rk_read_latest or rk_read_next, rk_decode_*;
+ *              rk_reader_of;  each tick: rk_state, rk_read_*, rk_decode_*, rk_accept;
  *              every 100 ms: rk_owner_alive, rk_replaced;  rk_detach
  *
  * Nothing here allocates memory. rk_publish, rk_read_*, rk_encode_*, rk_decode_*, rk_state and

@@ -2,6 +2,8 @@
  * to start from, and a test: peer_test.cpp holds haptic_server in contact with it.
  *
  *   rikiseki_h_world [instance]         until SIGTERM */
+#define _GNU_SOURCE /* rikiseki.h needs it before the first system header */
+
 #include <signal.h>
 
 #include "protocol/rikiseki.h"
