@@ -30,8 +30,8 @@ struct Options {
 
 void ParseTarget(const std::string& text, PlayOptions& play) {
   char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &play.target[0], &play.target[1],
-                  &play.target[2], &rest) != 3) {
+  if (std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &play.target[0], &play.target[1], &play.target[2],
+                  &rest) != 3) {
     throw StartError(kExitUsage, "--target must be x,y,z in metres");
   }
   play.has_target = true;
@@ -43,20 +43,21 @@ Options Parse(int argc, char** argv) {
   std::vector<std::string> words;
   po::options_description shown(
       "protocol_check --as world | --as haptic | inspect NAME\n"
-      "plays one side and judges whatever implements the other, or looks at the live segments of an "
+      "plays one side and judges whatever implements the other, or looks at the live segments of "
+      "an "
       "instance");
   shown.add_options()("as", po::value(&options.as)->value_name("SIDE"),
                       "play the world, or the haptic side")(
-      "instance", po::value(&options.play.instance)->value_name("NAME"),
-      "which pair (default 0)")("case", po::value(&options.cases)->value_name("ID"),
-                                "only this case, or those under it; may be given often")(
+      "instance", po::value(&options.play.instance)->value_name("NAME"), "which pair (default 0)")(
+      "case", po::value(&options.cases)->value_name("ID"),
+      "only this case, or those under it; may be given often")(
       "strict", po::bool_switch(&options.strict), "a SHOULD that is not met fails too")(
       "junit", po::value(&options.junit)->value_name("FILE"), "writes the results as JUnit XML")(
       "target", po::value(&target)->value_name("X,Y,Z"),
       "where the box is, m (default: at the origin as haptic, brought to the finger as world)")(
       "wait", po::value(&options.wait_s)->value_name("SECONDS"),
       "for the other side to come (default 10)")("list", po::bool_switch(&options.list),
-                                                  "prints the cases and their sentences")(
+                                                 "prints the cases and their sentences")(
       "version", "prints the version")("help", "prints this");
   po::options_description all;
   all.add(shown).add_options()("words", po::value(&words), "");
@@ -112,9 +113,8 @@ int Run(const Options& options) {
   }
   for (const std::string& wanted : options.cases) {
     const auto ids = CaseIds();
-    if (std::none_of(ids.begin(), ids.end(), [&](const std::string& id) {
-          return Selected(id, std::span(&wanted, 1));
-        })) {
+    if (std::none_of(ids.begin(), ids.end(),
+                     [&](const std::string& id) { return Selected(id, std::span(&wanted, 1)); })) {
       throw StartError(kExitUsage, "there is no case '" + wanted + "'; see --list");
     }
   }

@@ -19,8 +19,8 @@ constexpr double kPatience = 180;
 /// The kit's exit status; its report, if that is not 0, goes to the test's.
 int Check(const std::string& instance, const std::vector<std::string>& more) {
   const std::string junit = (std::filesystem::temp_directory_path() / (instance + ".xml")).string();
-  std::vector<std::string> command{Program("protocol_check"), "--instance", instance, "--strict",
-                                   "--junit", junit};
+  std::vector<std::string> command{
+      Program("protocol_check"), "--instance", instance, "--strict", "--junit", junit};
   command.insert(command.end(), more.begin(), more.end());
   Child kit(command);
   const int status = kit.Wait(kPatience);
@@ -44,7 +44,8 @@ TEST_CASE("haptic_server passes protocol_check --strict, its hand at rest") {
   CHECK(Check(instance, {"--as", "world"}) == 0);
 }
 
-TEST_CASE("world_server passes protocol_check --strict, with a box that is fixed, and one that moves") {
+TEST_CASE(
+    "world_server passes protocol_check --strict, with a box that is fixed, and one that moves") {
   const bool fixed = GENERATE(true, false);
   const std::string scene = fixed ? "config/scenes/conformance.sdf" : "config/scenes/push.sdf";
   INFO(scene);
@@ -88,9 +89,12 @@ TEST_CASE("protocol_check refuses a role that somebody has, and wrong command li
   Observe(instance, Role::kWorld);
   Child kit({Program("protocol_check"), "--as", "world", "--instance", instance});
   CHECK(kit.Wait() == 75);
-  for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
-           {"--as", "both"}, {}, {"inspect"}, {"--as", "world", "--case", "haptic/none"},
-           {"--as", "world", "--target", "1,2"}}) {
+  for (const std::vector<std::string>& arguments :
+       std::vector<std::vector<std::string>>{{"--as", "both"},
+                                             {},
+                                             {"inspect"},
+                                             {"--as", "world", "--case", "haptic/none"},
+                                             {"--as", "world", "--target", "1,2"}}) {
     std::vector<std::string> command{Program("protocol_check")};
     command.insert(command.end(), arguments.begin(), arguments.end());
     Child wrong(command);

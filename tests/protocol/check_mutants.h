@@ -12,19 +12,19 @@ enum class HapticFault {
   kNone,
   kPublishBeforeWrite,
   kCounterBackwards,
-  kMomentAboutFinger,   // L in another frame
-  kIncrements,          // the impulse of a tick instead of the total
-  kWrongSign,           // J on the user
-  kNominalTime,         // no correction by the true duration
-  kPulls,               // the normal inverted
+  kMomentAboutFinger,  // L in another frame
+  kIncrements,         // the impulse of a tick instead of the total
+  kWrongSign,          // J on the user
+  kNominalTime,        // no correction by the true duration
+  kPulls,              // the normal inverted
   kNoHeartbeat,
-  kOldEpoch,            // the one of an earlier life
+  kOldEpoch,  // the one of an earlier life
   kNeverReady,
-  kForceForever,        // not zero when the world is silent
+  kForceForever,  // not zero when the world is silent
   kNoFirstLook,
   kNoSecondLook,
-  kFreesEarly,          // a closed channel without waiting for the ack
-  kKeepsChannels,       // over a restart of the world
+  kFreesEarly,     // a closed channel without waiting for the ack
+  kKeepsChannels,  // over a restart of the world
   kTakesNonsense,
   kIgnoresHash,
   kEverySecondTick,
@@ -36,7 +36,7 @@ enum class HapticFault {
 enum class WorldFault {
   kNone,
   kAppliesTwice,
-  kAcksAhead,          // without publishing what was applied
+  kAcksAhead,  // without publishing what was applied
   kNoBaseline,
   kNormalInverted,
   kNormalNotUnit,
@@ -49,7 +49,7 @@ enum class WorldFault {
   kWrongDirection,
   kTakesNonsense,
   kNeverDetaches,
-  kWaitsForHaptic,     // no frames alone
+  kWaitsForHaptic,  // no frames alone
   kNoSecondLook,
   kIgnoresHash,
   kPublishBeforeWrite,

@@ -58,6 +58,8 @@ bool ReadCarelessly(const Ring& ring, std::uint64_t number, Looks looks, Message
   std::uint64_t* const slot = ring.Slot(number);
   for (int i = 0; i < 3; ++i) {
     if (looks.first && load(slot[kSequenceWord]) != 2 * number) continue;
+    // As if it was preempted here, which the second look is for.
+    if (!looks.second) SleepUntil(MonotonicNow() + 50'000);
     const std::uint64_t shape = load(slot[kShapeWord]);
     std::vector<std::uint64_t> words(ring.payload_bytes / 8);
     for (std::size_t w = 0; w < words.size(); ++w) words[w] = load(slot[kPayloadWord + w]);

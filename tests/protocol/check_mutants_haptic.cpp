@@ -53,14 +53,15 @@ struct Haptic {
     const auto state =
         fault == HapticFault::kNeverReady ? SegmentState::kInitialising : SegmentState::kReady;
     const std::uint64_t an_hour = 3'600'000'000'000;
-    segment = std::make_unique<check::PlayedSegment>(check::SegmentScript{
-        .instance = instance,
-        .role = Role::kHaptic,
-        .streams = streams,
-        .epoch = fault == HapticFault::kOldEpoch ? std::max<std::uint64_t>(now, 2 * an_hour) - an_hour
-                                                 : now,
-        .state = state,
-        .alter = {}});
+    segment = std::make_unique<check::PlayedSegment>(
+        check::SegmentScript{.instance = instance,
+                             .role = Role::kHaptic,
+                             .streams = streams,
+                             .epoch = fault == HapticFault::kOldEpoch
+                                          ? std::max<std::uint64_t>(now, 2 * an_hour) - an_hour
+                                          : now,
+                             .state = state,
+                             .alter = {}});
     ticks = check::RawWriter(segment->RingOf(StreamType::kHapticTick));
     healths = check::RawWriter(segment->RingOf(StreamType::kHapticHealth));
   }
@@ -118,9 +119,9 @@ void Haptic::LookForWorld(std::int64_t now) {
   if (view != nullptr && !view->gone() && (!view->OwnerAlive() || !view->IsCurrent())) {
     view->MarkGone();
   }
-  const bool attached = view != nullptr && !view->gone() &&
-                        (view->State() == SegmentState::kReady ||
-                         view->State() == SegmentState::kFaulted);
+  const bool attached =
+      view != nullptr && !view->gone() &&
+      (view->State() == SegmentState::kReady || view->State() == SegmentState::kFaulted);
   if (attached) return;
   const ObjectId named = StatObject(SegmentName(instance, Role::kWorld)).id;
   if (named == ObjectId{} || named == refused) return;
@@ -153,7 +154,8 @@ void Haptic::LookForWorld(std::int64_t now) {
 
 bool Haptic::ReadFrame(WorldFrame& fresh) {
   if (view == nullptr && raw == nullptr) return false;
-  const bool skips_looks = fault == HapticFault::kNoFirstLook || fault == HapticFault::kNoSecondLook;
+  const bool skips_looks =
+      fault == HapticFault::kNoFirstLook || fault == HapticFault::kNoSecondLook;
   if (skips_looks && view != nullptr) {
     if (careless == nullptr || careless->header().epoch != view_epoch) return false;
     const Ring ring = careless->RingOf(careless->header().stream[0]);
@@ -235,8 +237,7 @@ Vector Haptic::Render() {
   Vector wanted{};
   for (std::uint32_t i = 0; i < frame.plane_count && shown_epoch != 0; ++i) {
     const Plane& plane = frame.planes[i];
-    const double depth =
-        kRadius - Dot(Difference(position, plane.point), plane.normal);
+    const double depth = kRadius - Dot(Difference(position, plane.point), plane.normal);
     if (plane.pointer != 0 || depth <= 0) continue;
     const auto same = [&](const Account& account) {
       return account.channel.body == plane.body && account.channel.generation == plane.generation;
@@ -295,9 +296,9 @@ void Haptic::Tick(std::int64_t now) {
   ground.impulse = Plus(ground.impulse, Quantise(Scaled(orphan, correction_s), ground_rest));
   const Vector force = Render();
   if (!live && gain <= 0) shown_epoch = 0;
-  position = Sum(position, Scaled(Difference(Sum({-0.05, 0, 0}, Scaled(force, 1 / kHandStiffness)),
-                                             position),
-                                  0.05));
+  position = Sum(
+      position,
+      Scaled(Difference(Sum({-0.05, 0, 0}, Scaled(force, 1 / kHandStiffness)), position), 0.05));
   displayed_force = force;
 
   for (Account& account : accounts) {
@@ -313,10 +314,9 @@ void Haptic::Tick(std::int64_t now) {
     }
     const ImpulseUnits grown = Quantise(Sum(now_impulse, late_impulse), account.rest);
     const Vector origin = fault == HapticFault::kMomentAboutFinger ? position : Vector{};
-    const ImpulseUnits turned =
-        Quantise(Sum(Cross(Difference(account.point, origin), now_impulse),
-                     Cross(Difference(old_point, origin), late_impulse)),
-                 account.angular_rest);
+    const ImpulseUnits turned = Quantise(Sum(Cross(Difference(account.point, origin), now_impulse),
+                                             Cross(Difference(old_point, origin), late_impulse)),
+                                         account.angular_rest);
     const ImpulseUnits impulse_before = channel.impulse;
     if (fault == HapticFault::kIncrements) {
       channel.impulse = grown;
@@ -331,8 +331,7 @@ void Haptic::Tick(std::int64_t now) {
           static_cast<double>(channel.impulse[i]) * kImpulseUnit * kT +
           static_cast<double>(impulse_before[i]) * kImpulseUnit * correction_s;
     }
-    if (Norm(account.force) == 0 && Norm(old_force) == 0 &&
-        channel.state == ChannelState::kOpen) {
+    if (Norm(account.force) == 0 && Norm(old_force) == 0 && channel.state == ChannelState::kOpen) {
       channel.state = ChannelState::kClosed;
       account.closed_tick = tick;
     }
@@ -361,10 +360,10 @@ void Haptic::Publish(std::int64_t now, std::int64_t duration) {
   message.pointers[0].radius = kRadius;
   message.pointers[0].position = position;
   message.pointers[0].force = displayed_force;
-  message.pointers[0].reason = shown_epoch == 0              ? ForceReason::kWorldAbsent
-                               : Norm(displayed_force) > 0   ? ForceReason::kContact
+  message.pointers[0].reason = shown_epoch == 0                  ? ForceReason::kWorldAbsent
+                               : Norm(displayed_force) > 0       ? ForceReason::kContact
                                : accounts.size() == kMaxChannels ? ForceReason::kNoChannel
-                                                             : ForceReason::kNoContact;
+                                                                 : ForceReason::kNoContact;
   message.ground = ground;
   for (const Account& account : accounts) {
     message.channels[message.channel_count++] = account.channel;

@@ -1,5 +1,7 @@
 // The conformance kit can fail: a tiny side that keeps SPEC.md passes every case, and for each way to break
 // it the kit names the case.
+#include "tests/protocol/check_mutants.h"
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <fstream>
@@ -8,7 +10,6 @@
 
 #include "protocol/owner.h"
 #include "protocol/tools/check/suite.h"
-#include "tests/protocol/check_mutants.h"
 #include "tests/protocol/support.h"
 
 namespace rikiseki::protocol::test {

@@ -25,13 +25,13 @@ constexpr std::uint32_t kGeneration = 1;
 
 struct World {
   World(const std::string& name, WorldFault with) : instance(name), fault(with) {
-    segment = std::make_unique<check::PlayedSegment>(check::SegmentScript{
-        .instance = instance,
-        .role = Role::kWorld,
-        .streams = WorldStreams(kPeriodNs, 4, 100'000'000),
-        .epoch = static_cast<std::uint64_t>(MonotonicNow()),
-        .state = SegmentState::kReady,
-        .alter = {}});
+    segment = std::make_unique<check::PlayedSegment>(
+        check::SegmentScript{.instance = instance,
+                             .role = Role::kWorld,
+                             .streams = WorldStreams(kPeriodNs, 4, 100'000'000),
+                             .epoch = static_cast<std::uint64_t>(MonotonicNow()),
+                             .state = SegmentState::kReady,
+                             .alter = {}});
     frames = check::RawWriter(segment->RingOf(StreamType::kWorldFrame));
     healths = check::RawWriter(segment->RingOf(StreamType::kWorldHealth));
     bodies = check::RawWriter(segment->RingOf(StreamType::kWorldBodies));
@@ -85,7 +85,8 @@ void World::LookForHaptic() {
     refused = result.object;
     if (fault == WorldFault::kIgnoresHash) {
       careless = std::make_unique<check::RawView>(instance, Role::kHaptic);
-      reader = MessageReader<HapticTick>(StreamReader(careless->RingOf(careless->header().stream[0])));
+      reader =
+          MessageReader<HapticTick>(StreamReader(careless->RingOf(careless->header().stream[0])));
       epoch = careless->header().epoch;
       has_baseline = false;
       totals.clear();
@@ -110,8 +111,10 @@ void World::Take(const HapticTick& tick) {
   for (const auto& [key, channel] : now) {
     const auto known = totals.find(key);
     ImpulseUnits before{};
-    if (known != totals.end()) before = known->second.impulse;
-    else if (std::get<3>(key) <= last_tick && fault != WorldFault::kNoBaseline) before = channel.impulse;
+    if (known != totals.end())
+      before = known->second.impulse;
+    else if (std::get<3>(key) <= last_tick && fault != WorldFault::kNoBaseline)
+      before = channel.impulse;
     const ImpulseUnits grown = Minus(channel.impulse, before);
     const bool mine = tick.world_epoch == segment->epoch() || fault == WorldFault::kTakesForeign;
     const bool body_known = (channel.body == kBody && channel.generation == kGeneration) ||
@@ -131,7 +134,8 @@ void World::Take(const HapticTick& tick) {
 
 bool World::Consume() {
   HapticTick tick;
-  if (fault == WorldFault::kNoSecondLook && view != nullptr) {
+  const bool by_itself = fault == WorldFault::kNoSecondLook || fault == WorldFault::kNeverDetaches;
+  if (by_itself && view != nullptr) {
     if (careless == nullptr || careless->header().epoch != view->epoch()) return false;
     const Ring ring = careless->RingOf(careless->header().stream[0]);
     const std::uint64_t newest =
@@ -141,7 +145,10 @@ bool World::Consume() {
       careless_cursor = newest - ring.slot_count / 2;
     }
     ++careless_cursor;
-    if (ReadCarelessly(ring, careless_cursor, {.first = true, .second = false}, tick)) Take(tick);
+    if (ReadCarelessly(ring, careless_cursor,
+                       Looks{.first = true, .second = fault != WorldFault::kNoSecondLook}, tick)) {
+      Take(tick);
+    }
     return true;
   }
   const ReadStatus status = reader.ReadNext(tick);
@@ -153,10 +160,6 @@ bool World::Consume() {
   ++rejected;
   segment->CountRejected(rejected);
   if (fault == WorldFault::kTakesNonsense) last_tick = reader.received().number - 1;
-  if (fault == WorldFault::kNeverDetaches && reader.hopeless()) {
-    // A new reader of the same ring has forgotten the offences.
-    reader = view->Reader<HapticTick>();
-  }
   return true;
 }
 
@@ -187,7 +190,7 @@ void World::Tick(std::int64_t) {
   reader = view->Reader<HapticTick>();
   careless.reset();
   careless_cursor = 0;
-  if (fault == WorldFault::kNoSecondLook) {
+  if (fault == WorldFault::kNoSecondLook || fault == WorldFault::kNeverDetaches) {
     careless = MapCarelessly(instance, Role::kHaptic);
   }
   epoch = view->epoch();
@@ -221,9 +224,9 @@ void World::Publish() {
     const double side = finger[axis] < 0 ? -1 : 1;
     plane.point = finger;
     plane.point[axis] = side * kHalf;
-    plane.normal[axis] = fault == WorldFault::kNormalInverted   ? -side
+    plane.normal[axis] = fault == WorldFault::kNormalInverted  ? -side
                          : fault == WorldFault::kNormalNotUnit ? 0.5 * side
-                                                                : side;
+                                                               : side;
     message.planes[0] = plane;
     message.plane_count = 1;
   }

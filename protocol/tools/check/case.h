@@ -11,10 +11,10 @@ namespace rikiseki::protocol::check {
 /// In the order of severity: the exit status follows the worst.
 enum class Verdict {
   kOk,
-  kInformational,   // observed and told; no sentence decides it
-  kUnimplemented,   // the peer does not have this optional feature
-  kNonStrict,       // a SHOULD is not met
-  kFailed,          // a MUST is broken
+  kInformational,  // observed and told; no sentence decides it
+  kUnimplemented,  // the peer does not have this optional feature
+  kNonStrict,      // a SHOULD is not met
+  kFailed,         // a MUST is broken
 };
 
 /// "OK", "INFORMATIONAL", ...

@@ -51,7 +51,8 @@ void RateAndAbsence(WorldPlayer& player) {
   Require(player.Force() < kZeroForce, Num(player.Force()) + " N without a world");
   std::vector<std::int64_t> durations;
   for (std::size_t i = from; i < seen.size(); ++i) durations.push_back(seen[i].duration_ns);
-  std::nth_element(durations.begin(), durations.begin() + static_cast<std::ptrdiff_t>(durations.size() / 2),
+  std::nth_element(durations.begin(),
+                   durations.begin() + static_cast<std::ptrdiff_t>(durations.size() / 2),
                    durations.end());
   const std::int64_t median = durations[durations.size() / 2];
   const std::int64_t nominal = seen.back().period_ns;
@@ -178,8 +179,9 @@ void FreedAfterAck(WorldPlayer& player) {
   player.Release();
   const auto closed = [&] {
     const HapticTick& tick = player.newest();
-    return std::any_of(tick.channels.begin(), tick.channels.begin() + tick.channel_count,
-                       [](const Channel& channel) { return channel.state == ChannelState::kClosed; });
+    return std::any_of(
+        tick.channels.begin(), tick.channels.begin() + tick.channel_count,
+        [](const Channel& channel) { return channel.state == ChannelState::kClosed; });
   };
   const bool closes = player.Until(closed, 0.5);
   player.Run(0.2);  // the judge looks: it must not vanish before the ack
@@ -223,8 +225,8 @@ void Books(WorldPlayer& player) {
   player.Couple();
   const auto settled = [&] {
     const auto health = player.Health();
-    return health && health->books.displayed ==
-                         Plus(health->books.covered, health->books.peer_lost);
+    return health &&
+           health->books.displayed == Plus(health->books.covered, health->books.peer_lost);
   };
   Require(player.Until(settled, 3), "the books never settle: displayed - covered - peer_lost");
   const protocol::Books before = player.Health()->books;
@@ -270,8 +272,8 @@ void FalseAcks(WorldPlayer& player) {
   if (!player.peer().Has(StreamType::kHapticHealth)) Inform("no haptic.health: books not seen");
   const auto settled = [&] {
     const auto health = player.Health();
-    return health && health->books.displayed ==
-                         Plus(health->books.covered, health->books.peer_lost);
+    return health &&
+           health->books.displayed == Plus(health->books.covered, health->books.peer_lost);
   };
   Require(player.Until(settled, 2), "after false acks the books never settle");
   const protocol::Books books = player.Health()->books;

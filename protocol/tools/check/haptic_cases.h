@@ -10,8 +10,8 @@ namespace rikiseki::protocol::check {
 
 using HapticCase = Case<WorldPlayer>;
 
-std::span<const HapticCase> HapticSegmentCases();  // header, liveness, ring
-std::span<const HapticCase> HapticContactCases();  // what is displayed, and booked
+std::span<const HapticCase> HapticSegmentCases();   // header, liveness, ring
+std::span<const HapticCase> HapticContactCases();   // what is displayed, and booked
 std::span<const HapticCase> HapticNonsenseCases();  // what is refused
 std::span<const HapticCase> HapticEndCases();       // late, silent, dead, restarted
 std::span<const HapticCase> HapticMonitorCases();   // judged on every tick of the run

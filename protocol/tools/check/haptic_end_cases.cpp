@@ -39,12 +39,13 @@ void RequireZeroWithin(WorldPlayer& player, std::size_t from, std::int64_t end_n
   const std::int64_t begin = std::max(end_ns, seen[from].start_ns);
   const std::int64_t took =
       seen[zero].start_ns - begin - StallsNs(seen, from, zero) - 3 * seen[zero].period_ns;
-  Require(took <= bound_ns, what + ": zero force only after " + Ms(took) + ", " + Ms(bound_ns) +
-                                " is the bound");
+  Require(took <= bound_ns,
+          what + ": zero force only after " + Ms(took) + ", " + Ms(bound_ns) + " is the bound");
 }
 
 void CheckStated(WorldPlayer& player, std::int64_t bound) {
-  const std::int64_t table = std::max<std::int64_t>(5 * player.period_ns, 250'000'000) + 100'000'000;
+  const std::int64_t table =
+      std::max<std::int64_t>(5 * player.period_ns, 250'000'000) + 100'000'000;
   const std::int64_t ticks = 10 * player.seen().back().period_ns;
   if (bound > table + ticks) {
     NotStrict("zero_force_after_ns states " + Ms(bound) + ", the table " + Ms(table));
@@ -65,8 +66,9 @@ void Late(WorldPlayer& player) {
     const double gap = Dot(Difference(tick.position, plane.point), plane.normal) - tick.radius;
     if (gap > -0.0001) continue;
     ++looks;
-    Require(Norm(tick.force) >= kZeroForce,
-            "the surface is not held: no force " + Ms(tick.start_ns - pause) + " after the last frame");
+    Require(
+        Norm(tick.force) >= kZeroForce,
+        "the surface is not held: no force " + Ms(tick.start_ns - pause) + " after the last frame");
   }
   player.publishing = true;
   const std::uint64_t frame = player.frame();
@@ -157,14 +159,10 @@ void Faulted(WorldPlayer& player) {
 }
 
 constexpr HapticCase kCases[] = {
-    {"haptic/5.4-1/late", Late},
-    {"haptic/5.5-2/silence", Silence},
-    {"haptic/5.5-6/returns", Returns},
-    {"haptic/5.5-1/death", Death},
-    {"haptic/7.6-3/restart", Restarts},
-    {"haptic/4.2-1/mid-write", MidWrite},
-    {"haptic/5.4-1/closes", Closes},
-    {"haptic/5.4-4/faulted", Faulted},
+    {"haptic/5.4-1/late", Late},        {"haptic/5.5-2/silence", Silence},
+    {"haptic/5.5-6/returns", Returns},  {"haptic/5.5-1/death", Death},
+    {"haptic/7.6-3/restart", Restarts}, {"haptic/4.2-1/mid-write", MidWrite},
+    {"haptic/5.4-1/closes", Closes},    {"haptic/5.4-4/faulted", Faulted},
 };
 
 }  // namespace

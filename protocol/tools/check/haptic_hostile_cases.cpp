@@ -9,7 +9,7 @@
 namespace rikiseki::protocol::check {
 namespace {
 
-constexpr std::uint32_t kGhost = 666;  // a body that stands only in frames to be left alone
+constexpr std::uint32_t kGhost = 666;   // a body that stands only in frames to be left alone
 constexpr std::int64_t kWholeNs = 400;  // how long a message stays whole: as long as a copy takes
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -84,7 +84,8 @@ void UnknownEnumerator(WorldPlayer& player) {
   Refuses(player, [](Words& words, Encoded&) { Poke(words, Head("coupling"), std::uint32_t{77}); });
 }
 void WrongPointer(WorldPlayer& player) {
-  Refuses(player, [](Words& words, Encoded&) { Poke(words, OfPlane("pointer"), std::uint32_t{4}); });
+  Refuses(player,
+          [](Words& words, Encoded&) { Poke(words, OfPlane("pointer"), std::uint32_t{4}); });
 }
 void WrongPeriod(WorldPlayer& player) {
   Refuses(player,
@@ -278,8 +279,9 @@ void Flood(WorldPlayer& player) {
   player.Leave();
   player.period_ns = period;
   player.Couple();
-  const auto nominal = static_cast<double>(500'000'000) /
-                       static_cast<double>(std::max<std::int64_t>(player.seen().back().period_ns, 1));
+  const auto nominal =
+      static_cast<double>(500'000'000) /
+      static_cast<double>(std::max<std::int64_t>(player.seen().back().period_ns, 1));
   Require(static_cast<double>(ticks) > 0.4 * nominal,
           "only " + std::to_string(ticks) + " ticks in half a second of 20 000 frames a second");
   if (!displayed) Inform("a world of 20 kHz is not displayed");
@@ -299,21 +301,24 @@ void NeverNamed(WorldPlayer& player, const std::function<void(SegmentHeader&)>& 
 
 void Major(WorldPlayer& player) {
   player.Leave();
-  NeverNamed(player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
-             "version_major differs");
+  NeverNamed(
+      player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
+      "version_major differs");
   player.Leave();
 }
 void Minor(WorldPlayer& player) {
   if (kVersionMajor != 0) Unimplemented("from 1.0 on minor versions may differ");
   player.Leave();
-  NeverNamed(player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
-             "version_minor differs under major 0");
+  NeverNamed(
+      player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
+      "version_minor differs under major 0");
   player.Leave();
 }
 void Hash(WorldPlayer& player) {
   player.Leave();
-  NeverNamed(player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
-             "layout_hash differs under the same version");
+  NeverNamed(
+      player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
+      "layout_hash differs under the same version");
   player.Leave();
 }
 void Initialising(WorldPlayer& player) {

@@ -28,7 +28,7 @@ Vector TotalForce(const HapticTick& tick) {
 }
 
 ImpulseUnits GrowthOf(const Totals& before, const Channel& channel,
-                      const ImpulseUnits Channel::* which) {
+                      const ImpulseUnits Channel::*which) {
   const auto known = before.find(KeyOf(channel));
   return Minus(channel.*which, known == before.end() ? ImpulseUnits{} : known->second.*which);
 }
@@ -99,11 +99,10 @@ void HapticJudge::Sequence(const HapticTick& tick, const Received& received) {
   });
   stamp_ns_ = received.stamp_ns;
   if (!any_ || received.number != number_ + 1) return;
-  monitor_.Judge(
-      kDuration, tick.start_ns - newest_.start_ns == tick.previous_duration_ns, [&] {
-        return "start_ns grew by " + std::to_string(tick.start_ns - newest_.start_ns) +
-               ", previous_duration_ns is " + std::to_string(tick.previous_duration_ns) + At(tick);
-      });
+  monitor_.Judge(kDuration, tick.start_ns - newest_.start_ns == tick.previous_duration_ns, [&] {
+    return "start_ns grew by " + std::to_string(tick.start_ns - newest_.start_ns) +
+           ", previous_duration_ns is " + std::to_string(tick.previous_duration_ns) + At(tick);
+  });
 }
 
 void HapticJudge::Frames(const HapticTick& tick) {
@@ -111,11 +110,11 @@ void HapticJudge::Frames(const HapticTick& tick) {
   const auto newest = newest_frame_.find(tick.world_epoch);
   // Before the kit came there may have been another world.
   if (newest == newest_frame_.end() && seen_.empty()) return;
-  const bool known = newest != newest_frame_.end() ||
-                     (any_ && newest_.world_epoch == tick.world_epoch);
+  const bool known =
+      newest != newest_frame_.end() || (any_ && newest_.world_epoch == tick.world_epoch);
   const bool published = newest == newest_frame_.end() || tick.world_frame <= newest->second;
-  const bool forward = !any_ || newest_.world_epoch != tick.world_epoch ||
-                       tick.world_frame >= newest_.world_frame;
+  const bool forward =
+      !any_ || newest_.world_epoch != tick.world_epoch || tick.world_frame >= newest_.world_frame;
   const bool epoch_forward = !any_ || tick.world_epoch >= newest_.world_epoch;
   monitor_.Judge(kNames, known && published && forward && epoch_forward, [&] {
     return "names frame " + std::to_string(tick.world_frame) + " of epoch " +
@@ -130,9 +129,8 @@ void HapticJudge::Frames(const HapticTick& tick) {
     poisoned = poisoned || poisoned_bodies_.count(tick.channels[i].body) != 0;
   }
   if (poison_.empty() && poisoned_bodies_.empty()) return;
-  monitor_.Judge(kNeverShown, !poisoned, [&] {
-    return "displays a frame that had to be left alone" + At(tick);
-  });
+  monitor_.Judge(kNeverShown, !poisoned,
+                 [&] { return "displays a frame that had to be left alone" + At(tick); });
 }
 
 void HapticJudge::Forces(const HapticTick& tick, bool consecutive) {
@@ -151,7 +149,8 @@ void HapticJudge::Forces(const HapticTick& tick, bool consecutive) {
     const double step = Norm(Difference(TotalForce(tick), TotalForce(newest_)));
     const double most = slew_limit_ * Seconds(tick.period_ns) * (1 + 1e-9) + kNoForce;
     monitor_.Judge(kSlew, step <= most, [&] {
-      return "the force steps by " + Num(step) + " N, the slew limit allows " + Num(most) + At(tick);
+      return "the force steps by " + Num(step) + " N, the slew limit allows " + Num(most) +
+             At(tick);
     });
   }
   // 7.3, over all that the device displayed: every channel and the ground.
@@ -189,8 +188,8 @@ void HapticJudge::Forces(const HapticTick& tick, bool consecutive) {
   double scale = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     (*exact_)[i] += static_cast<long double>(expected[i]);
-    drift = std::max(drift, std::abs(static_cast<double>(
-                                static_cast<long double>(booked_[i]) - (*exact_)[i])));
+    drift = std::max(
+        drift, std::abs(static_cast<double>(static_cast<long double>(booked_[i]) - (*exact_)[i])));
     scale = std::max(scale, std::abs(static_cast<double>((*exact_)[i])));
   }
   // As many channels as there may be were opened and closed in between; 1e-12 is the doubles' own.
@@ -214,8 +213,8 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
       // One tick of the whole force is the most that a channel can hold at its birth.
       const double most =
           (Norm(TotalForce(tick)) * nominal + 1e-9 * tick.force_cap) / kImpulseUnit + 2;
-      monitor_.Judge(kOpens,
-                     channel.opened_tick <= tick.tick && Largest(channel.impulse) <= most, [&] {
+      monitor_.Judge(kOpens, channel.opened_tick <= tick.tick && Largest(channel.impulse) <= most,
+                     [&] {
                        return "a channel for body " + std::to_string(channel.body) +
                               " appears with opened_tick " + std::to_string(channel.opened_tick) +
                               " and " + Text(channel.impulse) + " units" + At(tick);
@@ -282,15 +281,13 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
     if (!consecutive || std::any_of(tick.channels.begin(), end, same)) continue;
     const auto closed = closed_at_.find(key);
     const bool other_world = tick.world_epoch != newest_.world_epoch && tick.world_epoch != 0;
-    const bool acked =
-        closed != closed_at_.end() && any_ack_ && closed->second <= acked_tick_;
+    const bool acked = closed != closed_at_.end() && any_ack_ && closed->second <= acked_tick_;
     monitor_.Judge(kFreed, other_world || acked, [&] {
       return "the channel of body " + std::to_string(std::get<0>(key)) +
-             (closed == closed_at_.end()
-                  ? " vanished without having been closed"
-                  : " was closed by tick " + std::to_string(closed->second) +
-                        " and freed when only tick " + std::to_string(acked_tick_) +
-                        " was acknowledged") +
+             (closed == closed_at_.end() ? " vanished without having been closed"
+                                         : " was closed by tick " + std::to_string(closed->second) +
+                                               " and freed when only tick " +
+                                               std::to_string(acked_tick_) + " was acknowledged") +
              At(tick);
     });
     closed_at_.erase(key);

@@ -75,14 +75,14 @@ void HapticPlayer::Open(const std::function<void(SegmentHeader&)>& alter, Segmen
                         std::uint32_t slots) {
   if (open()) Die();
   segment_.reset();
-  segment_ = std::make_unique<PlayedSegment>(SegmentScript{
-      .instance = options_.instance,
-      .role = Role::kHaptic,
-      .streams = {{StreamType::kHapticTick, kHapticTickBytes, slots,
-                   static_cast<std::uint64_t>(period_ns)}},
-      .epoch = role_.NextEpoch(),
-      .state = state,
-      .alter = alter});
+  segment_ = std::make_unique<PlayedSegment>(
+      SegmentScript{.instance = options_.instance,
+                    .role = Role::kHaptic,
+                    .streams = {{StreamType::kHapticTick, kHapticTickBytes, slots,
+                                 static_cast<std::uint64_t>(period_ns)}},
+                    .epoch = role_.NextEpoch(),
+                    .state = state,
+                    .alter = alter});
   writer_ = RawWriter(segment_->RingOf(StreamType::kHapticTick));
   published_[segment_->epoch()] = {};
   next_tick_ = 0;
@@ -212,10 +212,10 @@ void HapticPlayer::JudgeFrame(std::span<const std::uint64_t> words, const Receiv
     return "message " + std::to_string(received.number) + " is frame " +
            std::to_string(frame.frame);
   });
-  monitor_.Judge(kFrameStamps,
-                 received.stamp_ns >= frame_stamp_ns_ &&
-                     received.stamp_ns <= static_cast<std::uint64_t>(now),
-                 [&] { return "stamp_ns goes back or lies in the future" + at; });
+  monitor_.Judge(
+      kFrameStamps,
+      received.stamp_ns >= frame_stamp_ns_ && received.stamp_ns <= static_cast<std::uint64_t>(now),
+      [&] { return "stamp_ns goes back or lies in the future" + at; });
   if (consecutive && !seen_.empty()) {
     const WorldFrame& before = seen_.back().frame;
     if (frame.acked_epoch == before.acked_epoch && frame.acked_epoch != 0) {
@@ -234,9 +234,8 @@ void HapticPlayer::JudgeFrame(std::span<const std::uint64_t> words, const Receiv
                                FieldOffset("world.frame/plane", "normal");
     const double norm = std::hypot(RawDouble(words, normal), RawDouble(words, normal + 8),
                                    RawDouble(words, normal + 16));
-    monitor_.Judge(kUnitNormals, std::abs(norm - 1) <= 1e-6, [&] {
-      return "a normal of length " + Num(norm) + at;
-    });
+    monitor_.Judge(kUnitNormals, std::abs(norm - 1) <= 1e-6,
+                   [&] { return "a normal of length " + Num(norm) + at; });
   }
   if (frame.acked_epoch != 0) {
     const auto epoch = published_.find(frame.acked_epoch);
@@ -348,8 +347,9 @@ void HapticPlayer::Touch() {
       [&] {
         if (box() != nullptr) return true;
         const std::int64_t now = MonotonicNow();
-        position[0] = std::min(position[0] + kApproachSpeed * static_cast<double>(now - before) * 1e-9,
-                               target_[0] - 0.03);
+        position[0] =
+            std::min(position[0] + kApproachSpeed * static_cast<double>(now - before) * 1e-9,
+                     target_[0] - 0.03);
         before = now;
         return false;
       },
@@ -368,9 +368,7 @@ void HapticPlayer::Touch() {
 bool HapticPlayer::Settle(double seconds) {
   const std::uint64_t upto = tick();
   return Until(
-      [&] {
-        return newest_.acked_epoch == segment_->epoch() && newest_.acked_tick >= upto;
-      },
+      [&] { return newest_.acked_epoch == segment_->epoch() && newest_.acked_tick >= upto; },
       seconds);
 }
 

@@ -77,8 +77,8 @@ class HapticPlayer {
   std::int64_t period_ns = 1'000'000;
   bool publishing = true;
   Vector position{};
-  double radius = 0.01;     // m
-  double force_cap = 10;    // N
+  double radius = 0.01;   // m
+  double force_cap = 10;  // N
   std::function<void(HapticTick&)> amend;
   /// Added to the totals of the channel in every tick, in units.
   ImpulseUnits each_tick{};
@@ -148,8 +148,8 @@ class HapticPlayer {
 
   /// What every epoch of ours published: the sum over channels by tick.
   struct Published {
-    Totals totals;                       // of the newest tick
-    ImpulseUnits displayed{};            // growth since the first
+    Totals totals;             // of the newest tick
+    ImpulseUnits displayed{};  // growth since the first
     std::map<std::uint64_t, ImpulseUnits> by_tick;
     std::map<std::uint64_t, bool> spoilt;
     std::uint64_t alike_until = 0;

@@ -91,9 +91,10 @@ void CheckReserved(const RawView& view) {
 void CheckEpoch(const RawView& view) {
   const auto now = static_cast<std::uint64_t>(MonotonicNow());
   Require(view.header().epoch != 0, "epoch is 0");
-  Require(view.header().epoch <= now,
-          "epoch " + std::to_string(view.header().epoch) + " lies in the future: it is a time of "
-          "CLOCK_MONOTONIC, now " + std::to_string(now));
+  Require(view.header().epoch <= now, "epoch " + std::to_string(view.header().epoch) +
+                                          " lies in the future: it is a time of "
+                                          "CLOCK_MONOTONIC, now " +
+                                          std::to_string(now));
   // The kernel knows when the object was made, by the other clock. Suspension and clock steps forward
   // only make it look older.
   const auto [made_ns, known] = MadeNs(view.name());
@@ -176,8 +177,7 @@ void CheckPublication(const RawView& view, StreamType main, double seconds) {
 
 std::vector<Result> Inspect(const std::string& instance, Role role) {
   const std::string who = RoleName(role);
-  const StreamType main =
-      role == Role::kHaptic ? StreamType::kHapticTick : StreamType::kWorldFrame;
+  const StreamType main = role == Role::kHaptic ? StreamType::kHapticTick : StreamType::kWorldFrame;
   std::vector<Result> results;
   const auto add = [&](const std::string& id, const std::function<void()>& check) {
     const std::int64_t start = MonotonicNow();
@@ -195,9 +195,9 @@ std::vector<Result> Inspect(const std::string& instance, Role role) {
 
   AttachResult attached;
   add("9.1-1/header", [&] {
-        attached = Attach({.instance = instance, .role = role, .required = {}, .owners = {}});
-        Require(attached.status == AttachStatus::kAttached, attached.text);
-      });
+    attached = Attach({.instance = instance, .role = role, .required = {}, .owners = {}});
+    Require(attached.status == AttachStatus::kAttached, attached.text);
+  });
   if (attached.status != AttachStatus::kAttached) return results;
   const RawView raw(instance, role);
   add("3.1-8/reserved", [&] { CheckReserved(raw); });
@@ -206,29 +206,29 @@ std::vector<Result> Inspect(const std::string& instance, Role role) {
   add("3.1-4/heartbeat", [&] { CheckHeartbeat(raw, main, 0.5); });
   add("4.1-2/published", [&] { CheckPublication(raw, main, 0.3); });
   add("9.2-3/messages", [&] {
-        PeerView& view = *attached.view;
-        std::uint64_t seen = 0;
-        const auto read = [&](auto reader, auto message) {
-          for (int i = 0; i < 50; ++i) {
-            const ReadStatus status = reader.ReadNext(message);
-            if (status == ReadStatus::kFresh) ++seen;
-            Require(status != ReadStatus::kRejected,
-                    std::string("message ") + std::to_string(reader.received().number) + ": " +
-                        Describe(reader.refusal()));
-            if (status != ReadStatus::kFresh) break;
-          }
-        };
-        if (role == Role::kHaptic) {
-          read(view.Reader<HapticTick>(), HapticTick{});
-          read(view.Reader<HapticHealth>(), HapticHealth{});
-        } else {
-          read(view.Reader<WorldFrame>(), WorldFrame{});
-          read(view.Reader<WorldHealth>(), WorldHealth{});
-          BodiesReader bodies(view.Stream(StreamType::kWorldBodies));
-          Require(bodies.ReadLatest() != ReadStatus::kRejected, "world.bodies is not sound");
-        }
-        Require(seen > 0, "no message");
-      });
+    PeerView& view = *attached.view;
+    std::uint64_t seen = 0;
+    const auto read = [&](auto reader, auto message) {
+      for (int i = 0; i < 50; ++i) {
+        const ReadStatus status = reader.ReadNext(message);
+        if (status == ReadStatus::kFresh) ++seen;
+        Require(status != ReadStatus::kRejected, std::string("message ") +
+                                                     std::to_string(reader.received().number) +
+                                                     ": " + Describe(reader.refusal()));
+        if (status != ReadStatus::kFresh) break;
+      }
+    };
+    if (role == Role::kHaptic) {
+      read(view.Reader<HapticTick>(), HapticTick{});
+      read(view.Reader<HapticHealth>(), HapticHealth{});
+    } else {
+      read(view.Reader<WorldFrame>(), WorldFrame{});
+      read(view.Reader<WorldHealth>(), WorldHealth{});
+      BodiesReader bodies(view.Stream(StreamType::kWorldBodies));
+      Require(bodies.ReadLatest() != ReadStatus::kRejected, "world.bodies is not sound");
+    }
+    Require(seen > 0, "no message");
+  });
   return results;
 }
 

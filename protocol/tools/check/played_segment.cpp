@@ -192,8 +192,8 @@ std::size_t RecordBytes(std::string_view record) {
     const std::size_t type = text.find(':', line);
     const std::size_t offset = text.find(':', type + 1);
     const std::size_t size = text.find(':', offset + 1);
-    bytes = std::max<std::size_t>(bytes,
-                                  std::stoul(text.substr(offset + 1)) + std::stoul(text.substr(size + 1)));
+    bytes = std::max<std::size_t>(
+        bytes, std::stoul(text.substr(offset + 1)) + std::stoul(text.substr(size + 1)));
   }
   return bytes;
 }

@@ -47,9 +47,8 @@ void GoesOnAlone(HapticPlayer& player) {
   if (player.open()) player.Close();
   const std::size_t from = player.seen().size();
   player.Run(0.5);
-  Require(player.seen().size() >= from + 3,
-          "only " + std::to_string(player.seen().size() - from) +
-              " frames in half a second without a haptic side");
+  Require(player.seen().size() >= from + 3, "only " + std::to_string(player.seen().size() - from) +
+                                                " frames in half a second without a haptic side");
   const auto& seen = player.seen();
   std::vector<std::int64_t> gaps;
   for (std::size_t i = from + 1; i < seen.size(); ++i) {
@@ -81,8 +80,9 @@ void Attaches(HapticPlayer& player) {
 void AckAdvances(HapticPlayer& player) {
   player.Couple();
   player.Run(0.1);
-  Require(player.Settle(), "ticks are not acknowledged: " + std::to_string(player.newest().acked_tick) +
-                               " of " + std::to_string(player.tick()));
+  Require(player.Settle(),
+          "ticks are not acknowledged: " + std::to_string(player.newest().acked_tick) + " of " +
+              std::to_string(player.tick()));
 }
 
 void Planes(HapticPlayer& player) {
@@ -108,8 +108,8 @@ void Planes(HapticPlayer& player) {
 // SPEC.md 10: half extents of 0.03 m.
 void Box(HapticPlayer& player) {
   player.Touch();
-  const double half = std::abs(Dot(Difference(player.touched().point, player.target()),
-                                   player.touched().normal));
+  const double half =
+      std::abs(Dot(Difference(player.touched().point, player.target()), player.touched().normal));
   if (std::abs(half - 0.03) > 2e-3) {
     Inform("the box's face is " + Num(half) + " m from the target, the scene wants 0.03");
   }
@@ -369,14 +369,10 @@ void Bodies(HapticPlayer& player) {
 }
 
 constexpr WorldCase kSegmentCases[] = {
-    {"world/3.2-5/streams", Header},
-    {"world/3.1-8/reserved", Reserved},
-    {"world/5.2-10/epoch", Epoch},
-    {"world/5.1-1/mode", Mode},
-    {"world/3.1-4/heartbeat", Heartbeat},
-    {"world/4.1-2/published", Publication},
-    {"world/5.5-5/alone", GoesOnAlone},
-    {"world/10-7/period", WorldPeriod},
+    {"world/3.2-5/streams", Header},      {"world/3.1-8/reserved", Reserved},
+    {"world/5.2-10/epoch", Epoch},        {"world/5.1-1/mode", Mode},
+    {"world/3.1-4/heartbeat", Heartbeat}, {"world/4.1-2/published", Publication},
+    {"world/5.5-5/alone", GoesOnAlone},   {"world/10-7/period", WorldPeriod},
 };
 
 constexpr WorldCase kContactCases[] = {
@@ -411,11 +407,16 @@ void Monitored(HapticPlayer& player) {
 }
 
 constexpr WorldCase kMonitorCases[] = {
-    {kFrameSequence, Monitored<kFrameSequence>}, {kFrameStamps, Monitored<kFrameStamps>},
-    {kFrameSound, Monitored<kFrameSound>},       {kFrameNumbers, Monitored<kFrameNumbers>},
-    {kUnitNormals, Monitored<kUnitNormals>},     {kBaselineRange, Monitored<kBaselineRange>},
-    {kBaselineKept, Monitored<kBaselineKept>},   {kAckForward, Monitored<kAckForward>},
-    {kAckEpoch, Monitored<kAckEpoch>},           {kSum, Monitored<kSum>},
+    {kFrameSequence, Monitored<kFrameSequence>},
+    {kFrameStamps, Monitored<kFrameStamps>},
+    {kFrameSound, Monitored<kFrameSound>},
+    {kFrameNumbers, Monitored<kFrameNumbers>},
+    {kUnitNormals, Monitored<kUnitNormals>},
+    {kBaselineRange, Monitored<kBaselineRange>},
+    {kBaselineKept, Monitored<kBaselineKept>},
+    {kAckForward, Monitored<kAckForward>},
+    {kAckEpoch, Monitored<kAckEpoch>},
+    {kSum, Monitored<kSum>},
     {kRefused, Monitored<kRefused>},
 };
 

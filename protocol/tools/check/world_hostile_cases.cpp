@@ -74,10 +74,12 @@ void OneTooMany(HapticPlayer& player) {
   });
 }
 void UnknownEnumerator(HapticPlayer& player) {
-  Refuses(player, [](Words& words, Encoded&) { Poke(words, OfPointer("reason"), std::uint32_t{999}); });
+  Refuses(player,
+          [](Words& words, Encoded&) { Poke(words, OfPointer("reason"), std::uint32_t{999}); });
 }
 void WrongPointer(HapticPlayer& player) {
-  Refuses(player, [](Words& words, Encoded&) { Poke(words, OfPointer("pointer"), std::uint32_t{4}); });
+  Refuses(player,
+          [](Words& words, Encoded&) { Poke(words, OfPointer("pointer"), std::uint32_t{4}); });
 }
 void NegativeRadius(HapticPlayer& player) {
   Refuses(player, [](Words& words, Encoded&) { Poke(words, OfPointer("radius"), -1.0); });
@@ -103,8 +105,8 @@ void FarFinger(HapticPlayer& player) {
 void Detached(HapticPlayer& player, const char* what) {
   const std::uint64_t last = player.tick();
   player.Run(Frames(player, 6) + 0.2);
-  const bool left = player.newest().acked_epoch != player.segment().epoch() ||
-                    player.newest().acked_tick <= last;
+  const bool left =
+      player.newest().acked_epoch != player.segment().epoch() || player.newest().acked_tick <= last;
   player.Close();
   player.Open();
   player.Couple();
@@ -116,9 +118,8 @@ void TenInARow(HapticPlayer& player) {
   Require(player.Settle(), "ticks are not acknowledged");
   player.publishing = false;
   for (int i = 0; i < 14; ++i) {
-    player.PublishSpoilt(player.NextTick(), [](Words& words, Encoded&) {
-      Poke(words, OfPointer("position"), kNaN);
-    });
+    player.PublishSpoilt(player.NextTick(),
+                         [](Words& words, Encoded&) { Poke(words, OfPointer("position"), kNaN); });
   }
   player.Run(Frames(player, 3));
   player.publishing = true;
@@ -258,7 +259,8 @@ void Flood(HapticPlayer& player) {
   const bool settled = player.Settle(1);
   player.Close();
   player.period_ns = period;
-  Require(frames > 0.4 * nominal, Num(frames) + " frames in half a second of 20 000 ticks a second");
+  Require(frames > 0.4 * nominal,
+          Num(frames) + " frames in half a second of 20 000 ticks a second");
   if (player.monitor().breaches(kSum) > sums) player.monitor().Report(kSum);
   if (!settled) Inform("a haptic side of 20 kHz is not acknowledged to its end");
 }
@@ -277,19 +279,22 @@ void NeverAcked(HapticPlayer& player, const std::function<void(SegmentHeader&)>&
 }
 
 void Major(HapticPlayer& player) {
-  NeverAcked(player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
-             "version_major differs");
+  NeverAcked(
+      player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
+      "version_major differs");
   player.Close();
 }
 void Minor(HapticPlayer& player) {
   if (kVersionMajor != 0) Unimplemented("from 1.0 on minor versions may differ");
-  NeverAcked(player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
-             "version_minor differs under major 0");
+  NeverAcked(
+      player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
+      "version_minor differs under major 0");
   player.Close();
 }
 void Hash(HapticPlayer& player) {
-  NeverAcked(player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
-             "layout_hash differs under the same version");
+  NeverAcked(
+      player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
+      "layout_hash differs under the same version");
   player.Close();
 }
 void Initialising(HapticPlayer& player) {
@@ -319,7 +324,8 @@ void WrongHeaders(HapticPlayer& player) {
        [](SegmentHeader& h) { h.stream[0].ring_offset = ~std::uint64_t{127}; }},
       {"there is no haptic.tick", [](SegmentHeader& h) { h.stream[0].type_id = 999; }},
   };
-  for (const Wrong& wrong : kWrong) NeverAcked(player, wrong.alter, SegmentState::kReady, wrong.what);
+  for (const Wrong& wrong : kWrong)
+    NeverAcked(player, wrong.alter, SegmentState::kReady, wrong.what);
   player.Close();
   player.Open();
   player.Couple();
@@ -364,8 +370,10 @@ void LastWords(HapticPlayer& player, bool cleanly, const char* what) {
   const std::uint64_t old_epoch = player.segment().epoch();
   const std::uint64_t last = player.tick();
   const std::size_t from = player.seen().size();
-  if (cleanly) player.Close();
-  else player.Die();
+  if (cleanly)
+    player.Close();
+  else
+    player.Die();
   player.Open();
   player.OpenChannel(box.body, box.generation);
   player.Couple();

@@ -69,14 +69,14 @@ void WorldPlayer::Open(const std::function<void(SegmentHeader&)>& alter, Segment
                        std::uint32_t slots) {
   if (open()) Die();
   segment_.reset();
-  segment_ = std::make_unique<PlayedSegment>(SegmentScript{
-      .instance = options_.instance,
-      .role = Role::kWorld,
-      .streams = {{StreamType::kWorldFrame, kWorldFrameBytes, slots,
-                   static_cast<std::uint64_t>(period_ns)}},
-      .epoch = role_.NextEpoch(),
-      .state = state,
-      .alter = alter});
+  segment_ = std::make_unique<PlayedSegment>(
+      SegmentScript{.instance = options_.instance,
+                    .role = Role::kWorld,
+                    .streams = {{StreamType::kWorldFrame, kWorldFrameBytes, slots,
+                                 static_cast<std::uint64_t>(period_ns)}},
+                    .epoch = role_.NextEpoch(),
+                    .state = state,
+                    .alter = alter});
   writer_ = RawWriter(segment_->RingOf(StreamType::kWorldFrame));
   frame_ = 0;
   next_frame_ns_ = 0;
@@ -118,8 +118,8 @@ void WorldPlayer::Drain() {
     if (status == ReadStatus::kFresh) {
       judge_.Tick(tick_, ticks_.received());
       Book(tick_);
-      longest_pause_ns_ = std::max(longest_pause_ns_,
-                                   static_cast<std::int64_t>(tick_.previous_duration_ns));
+      longest_pause_ns_ =
+          std::max(longest_pause_ns_, static_cast<std::int64_t>(tick_.previous_duration_ns));
       continue;
     }
     monitor_.Judge(kSound, status != ReadStatus::kRejected, [&] {
@@ -168,8 +168,8 @@ void WorldPlayer::Publish(const WorldFrame& frame) {
                         std::span(frame.planes).first(frame.plane_count));
   std::vector<std::uint64_t> words(kWorldFrameBytes / 8);
   const Encoded encoded = Encode(frame, words);
-  writer_.Publish(std::span<const std::uint64_t>(words).first(encoded.used_bytes / 8),
-                  encoded, static_cast<std::uint64_t>(MonotonicNow()));
+  writer_.Publish(std::span<const std::uint64_t>(words).first(encoded.used_bytes / 8), encoded,
+                  static_cast<std::uint64_t>(MonotonicNow()));
 }
 
 void WorldPlayer::PublishSpoilt(

@@ -35,7 +35,7 @@ class WorldPlayer {
   HapticJudge& judge() { return judge_; }
   const std::vector<SeenTick>& seen() const { return judge_.seen(); }
   const HapticTick& newest() const { return judge_.newest(); }
-  double Force() const;   // N, of the first pointer, in the newest tick
+  double Force() const;     // N, of the first pointer, in the newest tick
   bool DisplaysUs() const;  // it names our epoch
   /// The newest health message; none if the peer has no such stream.
   std::optional<HapticHealth> Health();
