@@ -1110,7 +1110,7 @@ class World:
     """A box at the target: fixed, or with a mass on a rail along x, slowed by drag. The rail takes up what
     points across it. A block that left the reach is put back after two seconds, as another generation."""
 
-    REACH = 0.08  # m
+    REACH = 0.04  # m: a finger that comes back always finds it again
     PATIENCE = 2.0  # s
 
     def __init__(self, target, mass, drag):
