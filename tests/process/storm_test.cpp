@@ -120,10 +120,9 @@ class Storm {
   // Closes the haptic side, lets the world take all that it published, and closes the world.
   void Close() {
     SeekContact();
-    watch_.Secure(Role::kHaptic);
-    watch_.Secure(Role::kWorld);
     const auto haptic_view = Observe(instance_, Role::kHaptic);
     const auto world_view = Observe(instance_, Role::kWorld);
+    CHECK(Eventually([&] { return watch_.Secure(Role::kHaptic) && watch_.Secure(Role::kWorld); }));
     haptic_->Signal(SIGTERM);
     CHECK(haptic_->Wait() == 0);
     protocol::HapticTick last;
@@ -230,13 +229,10 @@ class Storm {
 
   void Restart(Role role, int number) {
     std::printf("%4d restart %s in order\n", number, RoleName(role));
-    Of(role)->Freeze();
-    watch_.Secure(role);
-    Of(role)->Signal(SIGCONT);
+    Observe(instance_, role);  // ready, so that it ends in order
+    CHECK(Eventually([&] { return watch_.Secure(role); }));
     Of(role)->Signal(SIGTERM);
-    // Told before it blocks the signal, it ends by it.
-    const int status = Of(role)->Wait();
-    CHECK((status == 0 || status == -SIGTERM));
+    CHECK(Of(role)->Wait() == 0);
     Start(role);
   }
 

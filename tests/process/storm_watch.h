@@ -82,7 +82,8 @@ class StormWatch {
 
   /// Makes sure that the segment that now bears the name is being read, if it is ready. To be
   /// called while its owner lives (it may be stopped), before it is killed.
-  void Secure(protocol::Role role);
+  /// Whether the present one is being read.
+  bool Secure(protocol::Role role);
 
   /// Of the newest tick, N; 0 once its owner is dead.
   double Force() const { return force_; }
