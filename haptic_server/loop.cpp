@@ -11,6 +11,8 @@ namespace rikiseki::haptic {
 namespace {
 
 constexpr std::int64_t kHealthPeriodNs = 10'000'000;
+// CheckSettings keeps fade + cap/slew within 100 ms; a few ticks more to notice and to hold.
+constexpr std::int64_t kLongestReleaseNs = 110'000'000;
 
 }  // namespace
 
@@ -28,7 +30,7 @@ HapticLoop::HapticLoop(const Settings& settings, HapticStep& step, protocol::Seg
 void HapticLoop::Run(const std::atomic<bool>& stop) noexcept {
   PeriodicSchedule schedule(MonotonicNow(), period_ns_);
   std::int64_t missed = 0;
-  while (!stop.load(std::memory_order_relaxed)) {
+  while (!(stop.load(std::memory_order_relaxed) && IsReleased())) {
     const std::int64_t deadline_ns = schedule.deadline_ns();
     SleepUntil(deadline_ns);
     const std::int64_t now_ns = MonotonicNow();
@@ -40,11 +42,24 @@ void HapticLoop::Run(const std::atomic<bool>& stop) noexcept {
   Stop();
 }
 
+// A stop is no step in the force: the world is taken for lost first, so that the force fades.
+bool HapticLoop::IsReleased() noexcept {
+  if (!releasing_) {
+    releasing_ = true;
+    release_ticks_left_ = kLongestReleaseNs / period_ns_ + 1;
+    return false;
+  }
+  return step_.health().reason == protocol::ForceReason::kWorldAbsent ||
+         --release_ticks_left_ <= 0;
+}
+
 void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) noexcept {
   const TickTime time{.start_ns = now_ns,
                       .previous_duration_ns = performed_ == 0 ? 0 : now_ns - previous_start_ns_,
                       .missed = missed};
-  step_.Tick(time, ReadWorld(), tick_);
+  WorldInput world = ReadWorld();
+  if (releasing_) world.ready = false;
+  step_.Tick(time, world, tick_);
   previous_start_ns_ = now_ns;
   PublishTick();
 

@@ -23,7 +23,7 @@ class HapticLoop {
   /// What the scheduler gave; shown to whoever asks for health.
   void SetScheduling(const protocol::Scheduling& scheduling) { scheduling_ = scheduling; }
 
-  /// Ticks until told to stop, then lets the device go. // RT:
+  /// Ticks until told to stop, then lets the force fade and the device go. // RT:
   void Run(const std::atomic<bool>& stop) noexcept;
 
   /// One tick at `now_ns`, which was due at `deadline_ns`; `missed` deadlines were skipped before. // RT:
@@ -36,6 +36,7 @@ class HapticLoop {
   protocol::ForceReason reason() const noexcept { return reason_.load(std::memory_order_relaxed); }
 
  private:
+  bool IsReleased() noexcept;
   WorldInput ReadWorld() noexcept;
   void PublishTick() noexcept;
   void PublishHealth() noexcept;
@@ -59,6 +60,8 @@ class HapticLoop {
   std::atomic<protocol::ForceReason> reason_{protocol::ForceReason::kWorldAbsent};
   std::int64_t previous_start_ns_ = 0;
   std::uint64_t performed_ = 0;
+  bool releasing_ = false;
+  std::int64_t release_ticks_left_ = 0;
 };
 
 }  // namespace rikiseki::haptic

@@ -264,6 +264,19 @@ TEST_CASE(
   CheckSafe(watch);
 }
 
+TEST_CASE("haptic_server stopped in contact lets the force fade: no step above the slew limit") {
+  const Instance instance;
+  Child world(WorldCommand(instance));
+  Child haptic(HapticCommand(instance));
+  TickWatch watch(instance, kSlewLimit);
+  REQUIRE(WaitForPush(watch, 3));
+  haptic.Signal(SIGTERM);
+  CHECK(haptic.Wait() == 0);
+  REQUIRE(Eventually([&] { return watch.Latest().reason == ForceReason::kStopped; }));
+  CHECK(watch.Latest().force < kZeroForce);
+  CheckSafe(watch);
+}
+
 TEST_CASE("a second daemon of the same role is refused, and the first goes on") {
   const Instance instance;
   Child first(WorldCommand(instance));
