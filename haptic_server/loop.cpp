@@ -49,8 +49,7 @@ bool HapticLoop::IsReleased() noexcept {
     release_ticks_left_ = kLongestReleaseNs / period_ns_ + 1;
     return false;
   }
-  return step_.health().reason == protocol::ForceReason::kWorldAbsent ||
-         --release_ticks_left_ <= 0;
+  return step_.health().reason == protocol::ForceReason::kWorldAbsent || --release_ticks_left_ <= 0;
 }
 
 void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) noexcept {

@@ -49,7 +49,8 @@ void WorldLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t
 bool WorldLoop::DrainLedger() {
   bool fresh = false;
   while (true) {
-    const protocol::ReadStatus status = ticks_.ReadNext(tick_, static_cast<std::uint64_t>(MonotonicNow()));
+    const protocol::ReadStatus status =
+        ticks_.ReadNext(tick_, static_cast<std::uint64_t>(MonotonicNow()));
     if (status == protocol::ReadStatus::kFresh) {
       step_.Consume(tick_);
       newest_tick_ns_ = static_cast<std::int64_t>(tick_.start_ns + tick_.period_ns);
