@@ -535,13 +535,13 @@ TEST_CASE(
     const Peer fake_haptic(with_world, Role::kHaptic);
     REQUIRE(settle(fake_world, fake_haptic));
     if (i == 5) {  // everything that is made once has been made
+      Pause(500);  // the view before this one is given back within two polls of the attacher
       haptic_usage = UsageOf(haptic.pid());
       world_usage = UsageOf(world.pid());
       CHECK(haptic_usage.segments >= 2);
       CHECK(world_usage.segments >= 2);
     }
     if (i == restarts) {
-      // The view before this one is given back within two polls of the attacher.
       CHECK(Eventually([&] { return UsageOf(haptic.pid()) == haptic_usage; }, 3));
       CHECK(Eventually([&] { return UsageOf(world.pid()) == world_usage; }, 3));
       INFO(haptic_usage.descriptors << " " << haptic_usage.mappings << " now "
