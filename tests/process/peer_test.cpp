@@ -225,17 +225,12 @@ TEST_CASE("both sides in Python: contact, exact books, a restart of each") {
     haptic->Signal(SIGKILL);
     haptic->Wait();
   }
-  const auto world_view = Observe(instance, Role::kWorld);
   haptic.emplace(Peer("haptic", instance));
   const auto haptic_view = Observe(instance, Role::kHaptic);
   TickWatch watch(instance, ReadHapticHealth(*haptic_view).slew_limit);
   REQUIRE(WaitForPush(watch));
   REQUIRE(WaitForRelease(watch));
   SettledBooks(*haptic_view);
-  const protocol::Body block = ReadMovingBody(*world_view);
-  // The totals only grow, and come a little later than the bodies.
-  const double momentum = block.mass * std::abs(block.velocity[0]);
-  CHECK(Eventually([&] { return momentum <= Norm(ReadWorldHealth(*world_view).applied); }, 2));
 }
 
 TEST_CASE("a world of a page of C on rikiseki.h holds haptic_server and peer.py in contact") {
