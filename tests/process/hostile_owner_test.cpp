@@ -233,13 +233,6 @@ class Vandal {
   std::size_t bytes_ = 0;
 };
 
-void CheckSafe(const TickWatch& watch) {
-  CHECK(watch.lost() == 0);
-  CHECK(watch.finite());
-  CHECK(watch.worst_over_cap() <= 1e-9);
-  CHECK(watch.worst_over_slew() <= 1e-9);
-}
-
 // How long the hostile keep at it.
 double HostileSeconds() {
   return std::getenv("RIKISEKI_FULL") != nullptr ? 20 : 2;

@@ -147,4 +147,36 @@ protocol::Body ReadMovingBody(const protocol::PeerView& view) {
   return {};
 }
 
+double Norm(const protocol::Vector& v) {
+  return std::hypot(v[0], v[1], v[2]);
+}
+
+double Norm(const protocol::ImpulseUnits& units) {
+  return protocol::kImpulseUnit * std::hypot(static_cast<double>(units[0]),
+                                             static_cast<double>(units[1]),
+                                             static_cast<double>(units[2]));
+}
+
+protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::ImpulseUnits& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+
+void CheckSafe(const TickWatch& watch) {
+  CHECK(watch.lost() == 0);
+  CHECK(watch.finite());
+  CHECK(watch.worst_over_cap() <= 1e-9);
+  CHECK(watch.worst_over_slew() <= 1e-9);
+}
+
+protocol::Books SettledBooks(const protocol::PeerView& haptic) {
+  protocol::Books books;
+  CHECK(Eventually([&] {
+    books = ReadHapticHealth(haptic).books;
+    return Norm(books.displayed) > 0 && books.displayed == Sum(books.covered, books.peer_lost);
+  }));
+  CHECK(books.covered == Sum(books.applied, books.discarded));
+  CHECK(Norm(books.displayed) > 0);
+  return books;
+}
+
 }  // namespace rikiseki::test

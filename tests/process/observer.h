@@ -71,4 +71,15 @@ protocol::WorldFrame ReadWorldFrame(const protocol::PeerView& view);
 /// The first body that can move.
 protocol::Body ReadMovingBody(const protocol::PeerView& view);
 
+double Norm(const protocol::Vector& v);
+/// Length of an impulse, N s.
+double Norm(const protocol::ImpulseUnits& units);
+protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::ImpulseUnits& b);
+
+/// The promises that hold at every tick, whatever happens to the world.
+void CheckSafe(const TickWatch& watch);
+
+/// Waits until nothing is under way and checks that the haptic side's books balance to the unit.
+protocol::Books SettledBooks(const protocol::PeerView& haptic);
+
 }  // namespace rikiseki::test

@@ -22,7 +22,6 @@ using protocol::Role;
 constexpr double kSlewLimit = 5000;  // N/s, set below, whatever the shipped file says
 // The strings' tensions add up to zero but for rounding: 4 * 20 N * 2^-53 and some.
 constexpr double kZeroForce = 1e-12;  // N
-constexpr double kUnit = protocol::kImpulseUnit;
 
 std::vector<std::string> HapticCommand(const std::string& instance) {
   return {Program("haptic_server"),
@@ -43,39 +42,6 @@ std::vector<std::string> WorldCommand(const std::string& instance,
           instance,
           "--set",
           "coupling.coupling=" + coupling};
-}
-
-double Norm(const protocol::Vector& v) {
-  return std::hypot(v[0], v[1], v[2]);
-}
-
-double Norm(const protocol::ImpulseUnits& units) {
-  return kUnit * std::hypot(static_cast<double>(units[0]), static_cast<double>(units[1]),
-                            static_cast<double>(units[2]));
-}
-
-protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::ImpulseUnits& b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-
-// The promises that hold at every tick, whatever happens to the world.
-void CheckSafe(const TickWatch& watch) {
-  CHECK(watch.lost() == 0);
-  CHECK(watch.finite());
-  CHECK(watch.worst_over_cap() <= 1e-9);
-  CHECK(watch.worst_over_slew() <= 1e-9);
-}
-
-// Waits until nothing is under way and checks that the haptic side's books balance to the unit.
-void CheckBooks(const protocol::PeerView& haptic) {
-  protocol::Books books;
-  const bool settled = Eventually([&] {
-    books = ReadHapticHealth(haptic).books;
-    return books.displayed == Sum(books.covered, books.peer_lost);
-  });
-  CHECK(settled);
-  CHECK(books.covered == Sum(books.applied, books.discarded));
-  CHECK(Norm(books.displayed) > 0);
 }
 
 bool WaitForPush(const TickWatch& watch, double newtons = 1) {
@@ -131,7 +97,7 @@ TEST_CASE("the pair couples in both orders of start and delivers what it display
     CHECK(Eventually([&] { return Norm(ReadWorldHealth(*world_view).applied) > 0.05; }));
     CheckNotKicked(*world_view);
     REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
-    CheckBooks(*haptic_view);
+    SettledBooks(*haptic_view);
     CheckSafe(watch);
   }
   haptic->Signal(SIGTERM);
@@ -149,7 +115,7 @@ TEST_CASE("position discards every impulse, and says so") {
   const auto world_view = Observe(instance, Role::kWorld);
   REQUIRE(WaitForPush(watch));
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
-  CheckBooks(*haptic_view);
+  SettledBooks(*haptic_view);
   CHECK(Norm(ReadWorldHealth(*world_view).applied) == 0);
   CheckSafe(watch);
 }
@@ -183,7 +149,7 @@ TEST_CASE(
   CHECK(Eventually([&] { return ReadHapticHealth(*haptic_view).peer_state == PeerState::kLive; }));
   CheckNotKicked(*world_view);
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
-  CheckBooks(*haptic_view);
+  SettledBooks(*haptic_view);
   CHECK(Norm(ReadHapticHealth(*haptic_view).books.peer_lost) >
         0);  // nobody took it, and it is said
   CheckSafe(watch);
@@ -226,7 +192,7 @@ TEST_CASE(
   REQUIRE(WaitForPush(watch));
   CheckNotKicked(*world_view);
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
-  CheckBooks(*haptic_view);
+  SettledBooks(*haptic_view);
   CheckSafe(watch);
 }
 
@@ -260,7 +226,7 @@ TEST_CASE(
   world.Signal(SIGHUP);
   REQUIRE(WaitForPush(watch));
   REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
-  CheckBooks(*haptic_view);
+  SettledBooks(*haptic_view);
   CheckSafe(watch);
 }
 

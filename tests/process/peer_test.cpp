@@ -44,34 +44,6 @@ std::vector<std::string> WorldServer(const std::string& instance) {
           instance};
 }
 
-double Norm(const protocol::ImpulseUnits& units) {
-  return kUnit * std::hypot(static_cast<double>(units[0]), static_cast<double>(units[1]),
-                            static_cast<double>(units[2]));
-}
-
-protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::ImpulseUnits& b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-
-void CheckSafe(const TickWatch& watch) {
-  CHECK(watch.lost() == 0);
-  CHECK(watch.finite());
-  CHECK(watch.worst_over_cap() <= 1e-9);
-  CHECK(watch.worst_over_slew() <= 1e-9);
-}
-
-/// Waits until nothing is under way; the books must then balance to the unit.
-protocol::Books SettledBooks(const protocol::PeerView& haptic) {
-  protocol::Books books;
-  CHECK(Eventually([&] {
-    books = ReadHapticHealth(haptic).books;
-    return Norm(books.displayed) > 0 && books.displayed == Sum(books.covered, books.peer_lost);
-  }));
-  CHECK(books.covered == Sum(books.applied, books.discarded));
-  CHECK(Norm(books.displayed) > 0);
-  return books;
-}
-
 bool WaitForPush(const TickWatch& watch) {
   return Eventually([&] { return watch.Latest().force > 1; }, 15);
 }
