@@ -12,13 +12,14 @@
 #include "tests/lab/fig6.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/study.h"
+#include "tests/lab/wall.h"
 
 namespace rikiseki::lab {
 namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6(), Planes()};
+  return {Fig6(), Planes(), Wall()};
 }
 
 struct Options {
