@@ -10,6 +10,7 @@
 #include "common/exit_code.h"
 #include "common/version.h"
 #include "tests/lab/fig6.h"
+#include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/study.h"
 #include "tests/lab/wall.h"
@@ -19,7 +20,7 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6(), Planes(), Wall()};
+  return {Fig6(), Planes(), Wall(), MultirateMasses(), MultirateGrowth()};
 }
 
 struct Options {
