@@ -11,6 +11,7 @@
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/local_bodies.h"
+#include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 #include "protocol/messages.h"
 
@@ -22,17 +23,6 @@ inline constexpr double kRecoveryTime = 0.1;
 
 /// Coordinates beyond this [m] are taken for damage, not for places.
 inline constexpr double kLargestCoordinate = 1e12;
-
-/// A plane as it is displayed in one tick.
-struct Surface {
-  std::uint32_t pointer = 0;
-  std::uint32_t body = 0;
-  std::uint32_t generation = 0;
-  double stiffness = 0;  // N/m; 0 = it brings none of its own
-  double damping = 0;    // N s/m, used only where stiffness > 0
-  bool fixed = false;    // the world says that the body cannot move
-  HalfSpace plane;       // unit normal
-};
 
 /// Where a finger is when a frame arrives: decides which new features need recovery.
 struct FingerState {

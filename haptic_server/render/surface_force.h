@@ -9,21 +9,10 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
+#include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
-
-/// What one body does to the finger in this tick.
-struct BodyShare {
-  std::uint32_t body = 0;
-  std::uint32_t generation = 0;
-  Vec3 force = Vec3::Zero();         // N, on the user
-  Vec3 point = Vec3::Zero();         // m, where the opposite impulse acts on the body: D - r n
-  bool fixed = false;                // the body cannot move: its share belongs to the ground
-  Vec3 displacement = Vec3::Zero();  // m, e_b
-  double stiffness = 0;              // N/m, and damping, N s/m, that made the force
-  double damping = 0;
-};
 
 inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
 
@@ -32,8 +21,6 @@ inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
 /// the tick before)/T. With equal k and d this is the paper's f = k e + d (e - e_before)/T, split
 /// without remainder. Without `adhesion` a body only pushes: f_b is dropped where f_b . e_b <= 0,
 /// and when the finger is free.
-struct Surface;
-
 class SurfaceForce {
  public:
   SurfaceForce(const RenderSettings& settings, double period_s);
