@@ -62,6 +62,17 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Number("safety.lost_floor_ms", &safety.lost_floor_ms, 10, 2000,
                 "A silence shorter than this is never a loss.");
 
+  MappingSettings& mapping = settings.mapping;
+  schema.Vector("mapping.origin_mm", &mapping.origin_mm, -1e5, 1e5,
+                "Where the middle of the device lies in the world.");
+  schema.Vector(
+      "mapping.rotation_deg", &mapping.rotation_deg, -360, 360,
+      "Device axes in the world: roll, pitch and yaw about its fixed x, y and z, in turn.");
+  schema.Number("mapping.motion_scale", &mapping.motion_scale, 1e-3, 1e3,
+                "Metres in the world per metre of the device.");
+  schema.Number("mapping.force_scale", &mapping.force_scale, 1e-3, 1e3,
+                "Newtons at the device per newton in the world.");
+
   schema.Choice("device.kind", &settings.device.kind, {{"simulated", DeviceKind::kSimulated}},
                 "Which force display to drive.");
   schema.Path("device.file", &settings.device.file,
@@ -155,6 +166,10 @@ void RequireNotNegative(const std::string& key, double value) {
   }
 }
 
+void RequireFinite(const std::string& key, const Vec3& value) {
+  if (!value.allFinite()) throw std::invalid_argument(key + " must be finite");
+}
+
 }  // namespace
 
 std::int64_t Settings::period_ns() const {
@@ -201,6 +216,10 @@ void CheckSettings(const Settings& settings) {
   RequirePositive("safety.late_periods", settings.safety.late_periods);
   RequirePositive("safety.lost_periods", settings.safety.lost_periods);
   RequireNotNegative("safety.lost_floor_ms", settings.safety.lost_floor_ms);
+  RequirePositive("mapping.motion_scale", settings.mapping.motion_scale);
+  RequirePositive("mapping.force_scale", settings.mapping.force_scale);
+  RequireFinite("mapping.origin_mm", settings.mapping.origin_mm);
+  RequireFinite("mapping.rotation_deg", settings.mapping.rotation_deg);
   if (settings.period_ns() <= 0) throw std::invalid_argument("loop.rate_hz is too high");
   if (const auto conflict = FindConflict(settings)) {
     throw std::invalid_argument(conflict->key + ": " + conflict->why);

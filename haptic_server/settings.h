@@ -43,6 +43,16 @@ struct SafetySettings {
   double lost_floor_ms = 250;
 };
 
+/// How the device lies in the world: C = motion_scale R C_device + origin, f_device = force_scale
+/// R^T f_world. R turns about the fixed axes of the world: roll about x first, then pitch about y,
+/// then yaw about z.
+struct MappingSettings {
+  Vec3 origin_mm = Vec3::Zero();     // of the device, in the world
+  Vec3 rotation_deg = Vec3::Zero();  // roll pitch yaw
+  double motion_scale = 1;           // s_x, metres in the world per metre of the device
+  double force_scale = 1;            // s_f, newtons at the device per newton in the world
+};
+
 enum class DeviceKind { kSimulated };
 
 struct DeviceSettings {
@@ -84,6 +94,7 @@ struct Settings {
   LoopSettings loop;
   RenderSettings render;
   SafetySettings safety;
+  MappingSettings mapping;
   DeviceSettings device;
   HandSettings hand;
   SpidarSettings spidar;

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "common/clock.h"
+#include "haptic_server/device/mapping.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/ledger.h"
@@ -51,18 +52,20 @@ struct HapticStep::State {
         period_ns(checked.period_ns()),
         radius(checked.render.finger_radius_mm * 1e-3),
         device(used_device),
+        mapping(checked.mapping),
         track(checked.render.display, period_ns),
         surface_force(checked.render, Seconds(period_ns)),
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         peer(checked),
         safety(checked) {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
-    health.slew_limit = checked.safety.slew_limit_n_per_s;
+    health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
     const std::string name = device.Name();
     std::copy_n(name.begin(), std::min(name.size(), health.device.size() - 1),
                 health.device.begin());
   }
 
+  bool TakeSample(DeviceSample measured, bool clutched) noexcept;
   bool TakeFrame(const WorldInput& world) noexcept;
   void WatchWorld(const TickTime& time, const WorldInput& world, double speed) noexcept;
   std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
@@ -73,6 +76,7 @@ struct HapticStep::State {
   const std::int64_t period_ns;
   const double radius;  // m
   Device& device;
+  Mapping mapping;
 
   FeatureTrack track;
   SurfaceForce surface_force;
@@ -82,7 +86,7 @@ struct HapticStep::State {
 
   std::uint64_t tick = 0;
   std::int64_t start_ns = 0;
-  DeviceSample sample;             // the last sound one
+  DeviceSample sample;             // the last sound one, in W
   double penetration = 0;          // m, |e| of the tick before
   std::uint64_t newest_epoch = 0;  // of the newest sound frame, and its number
   std::uint64_t newest_frame = 0;
@@ -90,11 +94,25 @@ struct HapticStep::State {
   std::uint64_t shown_frame = 0;
   std::uint64_t channel_epoch = 0;  // whose bodies the channels are about
   std::uint64_t missed_in_a_row = 0;
-  Vec3 displayed = Vec3::Zero();  // N
+  Vec3 displayed = Vec3::Zero();  // N, in W
   std::array<HalfSpace, kMaxContactPlanes> planes;
   std::array<BodyShare, kMaxShares> shares;
   protocol::HapticHealth health;
 };
+
+// Puts a measurement into the world. False, and nothing is taken, if it does not lie there. // RT:
+bool HapticStep::State::TakeSample(DeviceSample measured, bool clutched) noexcept {
+  const Vec3 position = measured.position;
+  measured.position = mapping.Follow(position, clutched);
+  measured.velocity = clutched ? Vec3(Vec3::Zero()) : mapping.VelocityInWorld(measured.velocity);
+  if (!IsSound(measured)) return false;
+  FlushDenormals(measured.position);
+  FlushDenormals(measured.velocity);
+  measured.target = mapping.PointInWorld(measured.target);
+  if (!measured.target.allFinite()) measured.target = measured.position;
+  sample = measured;
+  return true;
+}
 
 // Whether a new frame came that may be used, and books its ack if so. // RT:
 bool HapticStep::State::TakeFrame(const WorldInput& world) noexcept {
@@ -177,7 +195,7 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   message.world_frame = shown_frame;
   message.stiffness = settings.render.stiffness_n_per_m;
   message.damping = settings.render.damping_ns_per_m;
-  message.force_cap = settings.safety.force_cap_n;
+  message.force_cap = settings.safety.force_cap_n * mapping.force_in_world();
   message.pointer_count = 1;
   protocol::Pointer& pointer = message.pointers[0];
   pointer = {};
@@ -221,40 +239,39 @@ HapticStep::HapticStep(const Settings& settings, Device& device, std::uint64_t o
 
 HapticStep::~HapticStep() = default;
 
-void HapticStep::Tick(const TickTime& time, const WorldInput& world,
-                      protocol::HapticTick& message) noexcept {
+void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message,
+                      const OperatorInput& wish) noexcept {
   State& state = *state_;
   SafetyInput input;
-  DeviceSample sample;
-  input.device_ok = state.device.Read(time.start_ns, sample) == DeviceStatus::kOk;
-  input.sample_finite = input.device_ok && IsSound(sample);
-  if (input.sample_finite) {
-    FlushDenormals(sample.position);
-    FlushDenormals(sample.velocity);
-    if (!sample.target.allFinite()) sample.target = sample.position;
-    state.sample = sample;
-    input.speed = sample.velocity.stableNorm();
-  }
+  DeviceSample measured;
+  input.device_ok = state.device.Read(time.start_ns, measured) == DeviceStatus::kOk;
+  input.sample_finite =
+      input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
+  if (input.sample_finite) input.speed = measured.velocity.stableNorm();
 
-  state.WatchWorld(time, world, input.speed);
+  state.WatchWorld(time, world, input.sample_finite ? state.sample.velocity.stableNorm() : 0);
 
   const PeerState peer = state.peer.state();
+  input.clutched = wish.clutch;
   std::span<const BodyShare> shares;
-  if (input.sample_finite &&
+  Vec3 wanted = Vec3::Zero();
+  if (input.sample_finite && !input.clutched &&
       (peer == PeerState::kLive || peer == PeerState::kLate || peer == PeerState::kLost)) {
     shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
-    for (const BodyShare& share : shares) input.wanted += share.force;
+    for (const BodyShare& share : shares) wanted += share.force;
   } else {
     state.surface_force.Reset();
     state.penetration = 0;
   }
 
+  input.wanted = state.mapping.ForceOnDevice(wanted);
   input.peer = peer;
   input.previous_duration_ns = time.previous_duration_ns;
   input.missed = time.missed;
-  Vec3 displayed = state.device.Write(state.safety.Limit(input));
-  if (!displayed.allFinite()) displayed.setZero();
-  state.safety.Displayed(displayed);
+  Vec3 on_device = state.device.Write(state.safety.Limit(input));
+  if (!on_device.allFinite()) on_device.setZero();
+  state.safety.Displayed(on_device);
+  const Vec3 displayed = state.mapping.ForceInWorld(on_device);
 
   state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
                      .pointer = kPointer,

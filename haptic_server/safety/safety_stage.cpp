@@ -45,9 +45,9 @@ ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
   return ForceReason::kContact;
 }
 
-void SafetyStage::MoveGain(const SafetyInput& input, bool fault) noexcept {
+void SafetyStage::MoveGain(const SafetyInput& input, bool no_force) noexcept {
   const double elapsed_s = std::max(Seconds(input.previous_duration_ns), 0.0);
-  if (fault) {
+  if (no_force) {
     gain_ = 0;
   } else if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
     // A stall must not skip the soft start: it counts as one period.
@@ -64,10 +64,11 @@ void SafetyStage::MoveGain(const SafetyInput& input, bool fault) noexcept {
 Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   const ForceReason fault = Fault(input);
   const bool faulted = fault != ForceReason::kContact;
-  MoveGain(input, faulted);
+  const bool no_force = faulted || input.clutched;
+  MoveGain(input, no_force);
 
-  const bool wants = !faulted && !input.wanted.isZero(0);
-  Vec3 target = faulted || gain_ == 0 ? Vec3(Vec3::Zero()) : Vec3(gain_ * input.wanted);
+  const bool wants = !no_force && !input.wanted.isZero(0);
+  Vec3 target = no_force || gain_ == 0 ? Vec3(Vec3::Zero()) : Vec3(gain_ * input.wanted);
   const bool capped = Shorten(target, settings_.force_cap_n);
   Vec3 change = target - displayed_;
   const bool slewed = Shorten(change, largest_step_n_);
@@ -84,6 +85,8 @@ Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
     reason_ = ForceReason::kWorldLost;
   } else if (input.peer != PeerState::kLive && input.peer != PeerState::kLate) {
     reason_ = ForceReason::kWorldAbsent;
+  } else if (input.clutched) {
+    reason_ = ForceReason::kClutched;
   } else if (slewed) {
     reason_ = ForceReason::kSlewLimited;
   } else if (capped) {

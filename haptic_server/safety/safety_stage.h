@@ -1,6 +1,6 @@
 // The last stage before the device. It trusts nobody: whatever the stages before computed, the
 // command is finite, within the force cap, within the slew limit, and zero when there is no reason
-// for a force.
+// for a force. All forces are those at the device, on the user.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +17,7 @@ struct SafetyInput {
   bool no_channel = false;     // a contact was left out of `wanted`
   bool device_ok = false;      // the device answered
   bool sample_finite = false;  // ... with finite numbers
+  bool clutched = false;       // the finger is disengaged from the world
   double speed = 0;            // m/s, of the finger
   protocol::PeerState peer = protocol::PeerState::kAbsent;
   std::int64_t previous_duration_ns = 0;  // true t_k - t_(k-1)
@@ -25,8 +26,8 @@ struct SafetyInput {
 
 /// The force grows and fades by a gain in 0..1 on what was rendered: it rises over soft_start_ms
 /// while a world is live or late, falls over fade_ms when it is lost, and is 0 at once on a fault
-/// (device, finite check, over-speed, deadlines missed in a row), from where it rises again by
-/// itself. The slew limit acts on every change, at the nominal period, against what was displayed
+/// (device, finite check, over-speed, deadlines missed in a row) and while the clutch is engaged,
+/// from where it rises again by itself. The slew limit acts on every change, at the nominal period, against what was displayed
 /// before: it is the last word.
 class SafetyStage {
  public:
@@ -46,7 +47,7 @@ class SafetyStage {
 
  private:
   protocol::ForceReason Fault(const SafetyInput& input) noexcept;
-  void MoveGain(const SafetyInput& input, bool fault) noexcept;
+  void MoveGain(const SafetyInput& input, bool no_force) noexcept;
 
   SafetySettings settings_;
   double period_s_;
