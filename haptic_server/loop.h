@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "haptic_server/operator_panel.h"
 #include "haptic_server/settings.h"
 #include "haptic_server/step.h"
 #include "protocol/owner.h"
@@ -18,7 +19,7 @@ class HapticLoop {
  public:
   /// All outlive the loop.
   HapticLoop(const Settings& settings, HapticStep& step, protocol::SegmentOwner& owner,
-             protocol::PeerLink& link);
+             protocol::PeerLink& link, OperatorPanel& panel);
 
   /// What the scheduler gave; shown to whoever asks for health.
   void SetScheduling(const protocol::Scheduling& scheduling) { scheduling_ = scheduling; }
@@ -46,6 +47,7 @@ class HapticLoop {
   HapticStep& step_;
   protocol::SegmentOwner& owner_;
   protocol::PeerLink& link_;
+  OperatorPanel& panel_;
 
   protocol::MessageWriter<protocol::HapticTick> ticks_;
   protocol::MessageWriter<protocol::HapticHealth> healths_;

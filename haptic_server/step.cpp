@@ -12,6 +12,7 @@
 #include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/ledger.h"
 #include "haptic_server/render/surface_force.h"
+#include "haptic_server/safety/emergency_stop.h"
 #include "haptic_server/safety/peer_watch.h"
 #include "haptic_server/safety/safety_stage.h"
 
@@ -82,6 +83,7 @@ struct HapticStep::State {
   SurfaceForce surface_force;
   Ledger ledger;
   PeerWatch peer;
+  EmergencyStop emergency_stop;
   SafetyStage safety;
 
   std::uint64_t tick = 0;
@@ -252,10 +254,11 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   state.WatchWorld(time, world, input.sample_finite ? state.sample.velocity.stableNorm() : 0);
 
   const PeerState peer = state.peer.state();
+  input.stopped = state.emergency_stop.Update(wish.stop, wish.enable, measured.enabled);
   input.clutched = wish.clutch;
   std::span<const BodyShare> shares;
   Vec3 wanted = Vec3::Zero();
-  if (input.sample_finite && !input.clutched &&
+  if (input.sample_finite && !input.stopped && !input.clutched &&
       (peer == PeerState::kLive || peer == PeerState::kLate || peer == PeerState::kLost)) {
     shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
     for (const BodyShare& share : shares) wanted += share.force;
@@ -268,7 +271,13 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   input.peer = peer;
   input.previous_duration_ns = time.previous_duration_ns;
   input.missed = time.missed;
-  Vec3 on_device = state.device.Write(state.safety.Limit(input));
+  const Vec3 command = state.safety.Limit(input);
+  Vec3 on_device = Vec3::Zero();
+  if (input.stopped) {
+    state.device.Release();
+  } else {
+    on_device = state.device.Write(command);
+  }
   if (!on_device.allFinite()) on_device.setZero();
   state.safety.Displayed(on_device);
   const Vec3 displayed = state.mapping.ForceInWorld(on_device);

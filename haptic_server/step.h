@@ -31,6 +31,8 @@ struct WorldInput {
 
 /// What an operator asks for in this tick, beside what the finger does.
 struct OperatorInput {
+  bool stop = false;    // emergency stop: minimum tension in this tick already, until enabled
+  bool enable = false;  // ends it, unless something asks for it in the same tick
   bool clutch = false;  // the hand moves, the finger's point in the world stays, without force
 };
 

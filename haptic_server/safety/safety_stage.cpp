@@ -64,7 +64,7 @@ void SafetyStage::MoveGain(const SafetyInput& input, bool no_force) noexcept {
 Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   const ForceReason fault = Fault(input);
   const bool faulted = fault != ForceReason::kContact;
-  const bool no_force = faulted || input.clutched;
+  const bool no_force = input.stopped || faulted || input.clutched;
   MoveGain(input, no_force);
 
   const bool wants = !no_force && !input.wanted.isZero(0);
@@ -77,9 +77,11 @@ Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   Shorten(command_, settings_.force_cap_n);
   zero_ticks_ = target.isZero(0) ? zero_ticks_ + 1 : 0;
   if (zero_ticks_ > ticks_to_zero_) command_.setZero();
-  if (!command_.allFinite()) command_.setZero();
+  if (!command_.allFinite() || input.stopped) command_.setZero();
 
-  if (faulted) {
+  if (input.stopped) {
+    reason_ = ForceReason::kEmergencyStop;
+  } else if (faulted) {
     reason_ = fault;
   } else if (input.peer == PeerState::kLost) {
     reason_ = ForceReason::kWorldLost;

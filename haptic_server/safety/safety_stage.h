@@ -17,6 +17,7 @@ struct SafetyInput {
   bool no_channel = false;     // a contact was left out of `wanted`
   bool device_ok = false;      // the device answered
   bool sample_finite = false;  // ... with finite numbers
+  bool stopped = false;        // emergency stop
   bool clutched = false;       // the finger is disengaged from the world
   double speed = 0;            // m/s, of the finger
   protocol::PeerState peer = protocol::PeerState::kAbsent;
@@ -26,9 +27,10 @@ struct SafetyInput {
 
 /// The force grows and fades by a gain in 0..1 on what was rendered: it rises over soft_start_ms
 /// while a world is live or late, falls over fade_ms when it is lost, and is 0 at once on a fault
-/// (device, finite check, over-speed, deadlines missed in a row) and while the clutch is engaged,
-/// from where it rises again by itself. The slew limit acts on every change, at the nominal period, against what was displayed
-/// before: it is the last word.
+/// (device, finite check, over-speed, deadlines missed in a row) and while the clutch is engaged or
+/// the emergency stop latched, from where it rises again by itself. The slew limit acts on every change, at the nominal period, against what was displayed
+/// before: it is the last word, but for the emergency stop, which takes the force away within the
+/// tick that it comes in. That is the one step in the force that is wanted.
 class SafetyStage {
  public:
   explicit SafetyStage(const Settings& settings);
