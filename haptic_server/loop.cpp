@@ -89,6 +89,10 @@ WorldInput HapticLoop::ReadWorld() noexcept {
     frames_ = link_.TakeNext()->Reader<protocol::WorldFrame>();
     read = read_latest();
   }
+  if (read == protocol::ReadStatus::kFresh) {
+    coupling_.store(frame_.coupling, std::memory_order_relaxed);
+    world_period_ns_.store(frame_.period_ns, std::memory_order_relaxed);
+  }
   if (frames_.hopeless()) link_.Refuse();
   const protocol::PeerView* view = link_.current();
   if (view == nullptr) return {};
@@ -103,6 +107,7 @@ void HapticLoop::PublishTick() noexcept {
   ticks_.Publish(tick_, now_ns);
   owner_.Heartbeat(tick_.tick, now_ns);
   reason_.store(step_.health().reason, std::memory_order_relaxed);
+  unstable_.store(step_.health().energy.unstable != 0, std::memory_order_relaxed);
 }
 
 void HapticLoop::PublishHealth() noexcept {

@@ -13,6 +13,7 @@
 #include "haptic_server/device/spidar.h"
 #include "haptic_server/keyboard.h"
 #include "haptic_server/loop.h"
+#include "haptic_server/safety/stability.h"
 #include "protocol/words.h"
 
 namespace {
@@ -72,13 +73,25 @@ bool IsRendering(protocol::ForceReason reason) {
 }
 
 // Logs what changed, for the tick may not; ends on SIGINT or SIGTERM.
-void Supervise(const HapticLoop& loop, protocol::PeerLink& link) {
+void Supervise(const Settings& settings, const HapticLoop& loop, protocol::PeerLink& link) {
   protocol::ForceReason logged = protocol::ForceReason::kNoContact;
+  HapticLoop::WorldMode mode;
+  bool unstable = false;
   while (true) {
     const int signal = WaitForSignal(kSupervisorPollMs);
     if (signal == SIGINT || signal == SIGTERM) return;
     if (signal == SIGHUP) spdlog::info("SIGHUP: haptic_server takes changed settings at a restart");
     for (const std::string& line : link.PollNews()) spdlog::info("world: {}", line);
+    if (loop.world_mode() != mode) {
+      mode = loop.world_mode();
+      const std::string advice =
+          CouplingAdvice(settings.render, mode.coupling, Seconds(mode.period_ns));
+      if (!advice.empty()) spdlog::info("stability: {}", advice);
+    }
+    if (loop.unstable() != unstable) {
+      unstable = !unstable;
+      if (unstable) spdlog::warn("the contact is unstable: lower the stiffness or raise damping");
+    }
     const protocol::ForceReason reason = loop.reason();
     if (IsRendering(reason) && IsRendering(logged)) continue;
     if (reason != logged) spdlog::info("force: {}", protocol::Sentence(reason));
@@ -95,6 +108,9 @@ int Run(int argc, char** argv) {
   std::string description;
   const Settings settings = LoadSettings(options.config, overrides, &description);
   StartLogging("haptic_server");
+  for (const std::string& warning : DeviceWarnings(settings)) {
+    spdlog::warn("stability: {}", warning);
+  }
   if (options.check) {
     std::fputs(description.c_str(), stdout);
     return kExitOk;
@@ -133,7 +149,7 @@ int Run(int argc, char** argv) {
     if (keyboard.is_there()) {
       spdlog::info("keys: space or enter = emergency stop, e = enable again, c = clutch");
     }
-    Supervise(loop, link);
+    Supervise(settings, loop, link);
   } catch (...) {
     stop = true;
     throw;

@@ -50,7 +50,12 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Number("safety.slew_limit_n_per_s", &safety.slew_limit_n_per_s, 10, 1e6,
                 "The displayed force does not change faster.");
   schema.Number("safety.speed_limit_m_per_s", &safety.speed_limit_m_per_s, 0.1, 100,
-                "A faster finger feels no force.");
+                "A faster finger feels no surface, only light damping.");
+  schema.Number("safety.light_damping_ns_per_m", &safety.light_damping_ns_per_m, 0, 20,
+                "Damping of a finger that is too fast, and of any while a lost world fades out.");
+  schema.Choice("safety.passivity_controller", &safety.passivity_controller,
+                {{"on", true}, {"off", false}},
+                "Whether energy that the rendering gives away is braked at once.");
   schema.Number("safety.soft_start_ms", &safety.soft_start_ms, 0, 5000,
                 "How long the force takes to come back after a world came or a fault went.");
   schema.Number("safety.fade_ms", &safety.fade_ms, 10, 100,
@@ -211,6 +216,7 @@ void CheckSettings(const Settings& settings) {
   RequirePositive("safety.force_cap_n", settings.safety.force_cap_n);
   RequirePositive("safety.slew_limit_n_per_s", settings.safety.slew_limit_n_per_s);
   RequirePositive("safety.speed_limit_m_per_s", settings.safety.speed_limit_m_per_s);
+  RequireNotNegative("safety.light_damping_ns_per_m", settings.safety.light_damping_ns_per_m);
   RequireNotNegative("safety.soft_start_ms", settings.safety.soft_start_ms);
   RequirePositive("safety.fade_ms", settings.safety.fade_ms);
   RequirePositive("safety.late_periods", settings.safety.late_periods);

@@ -36,6 +36,8 @@ struct SafetySettings {
   double force_cap_n = 10;
   double slew_limit_n_per_s = 5000;
   double speed_limit_m_per_s = 3;
+  double light_damping_ns_per_m = 1;  // of a finger that is too fast, and while a lost world fades
+  bool passivity_controller = false;
   double soft_start_ms = 200;  // the force grows over this after a world came
   double fade_ms = 80;         // ... and goes to zero over this when it is lost
   double late_periods = 2.5;   // no frame for this many world periods: hold

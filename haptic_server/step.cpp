@@ -12,7 +12,9 @@
 #include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/ledger.h"
 #include "haptic_server/render/surface_force.h"
+#include "haptic_server/render/surface_motion.h"
 #include "haptic_server/safety/emergency_stop.h"
+#include "haptic_server/safety/energy_meter.h"
 #include "haptic_server/safety/peer_watch.h"
 #include "haptic_server/safety/safety_stage.h"
 
@@ -58,7 +60,8 @@ struct HapticStep::State {
         surface_force(checked.render, Seconds(period_ns)),
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         peer(checked),
-        safety(checked) {
+        safety(checked),
+        energy(checked) {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
     health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
     const std::string name = device.Name();
@@ -70,6 +73,7 @@ struct HapticStep::State {
   bool TakeFrame(const WorldInput& world) noexcept;
   void WatchWorld(const TickTime& time, const WorldInput& world, double speed) noexcept;
   std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
+  void Release() noexcept;
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
                protocol::HapticTick& message) noexcept;
 
@@ -81,15 +85,18 @@ struct HapticStep::State {
 
   FeatureTrack track;
   SurfaceForce surface_force;
+  SurfaceMotion surface_motion;
   Ledger ledger;
   PeerWatch peer;
   EmergencyStop emergency_stop;
   SafetyStage safety;
+  EnergyMeter energy;
 
   std::uint64_t tick = 0;
   std::int64_t start_ns = 0;
   DeviceSample sample;             // the last sound one, in W
   double penetration = 0;          // m, |e| of the tick before
+  double surface_work = 0;         // J, since then
   std::uint64_t newest_epoch = 0;  // of the newest sound frame, and its number
   std::uint64_t newest_frame = 0;
   std::uint64_t shown_epoch = 0;  // whose surfaces are in the track; 0 = none
@@ -146,8 +153,7 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   if (tick > 0) track.Advance(elapsed_ticks);
   if (state == PeerState::kAbsent && shown_epoch != 0) {
     track.Clear();
-    surface_force.Reset();
-    penetration = 0;
+    Release();
     shown_epoch = shown_frame = 0;
   }
   if (fresh && peer.Accepts(world.epoch)) {
@@ -165,6 +171,14 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   }
 }
 
+// No contact in this tick. // RT:
+void HapticStep::State::Release() noexcept {
+  surface_force.Reset();
+  surface_motion.Reset();
+  penetration = 0;
+  surface_work = 0;
+}
+
 // Contact solve and surface force at the last sound sample. Bodies without a channel are left out.
 // // RT:
 std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
@@ -174,6 +188,9 @@ std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
   const ContactSolution contact =
       SolveContact(sample.position, radius, std::span(planes).first(surfaces.size()));
   penetration = contact.displacement.norm();
+  surface_work = surface_motion.Work(surfaces, displayed,
+                                     Seconds(period_ns) * static_cast<double>(elapsed_ticks));
+  surface_motion.Remember(surfaces, contact);
   std::size_t count = 0;
   for (const BodyShare& share : surface_force.Update(surfaces, contact, radius, elapsed_ticks)) {
     if (ledger.Open(share.body, share.generation, kPointer, tick)) {
@@ -228,6 +245,11 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   health.largest_force_step = std::max(health.largest_force_step, (force - displayed).norm());
   health.target = ToArray(sample.target);
   health.books = ledger.books();
+  health.energy = {.injected = energy.injected(),
+                   .dissipated = energy.dissipated(),
+                   .flagged = energy.times_flagged(),
+                   .unstable = energy.unstable() ? 1U : 0U,
+                   .controller = reason == ForceReason::kPassivity ? 1U : 0U};
 
   displayed = force;
   start_ns = time.start_ns;
@@ -263,8 +285,20 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
     shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
     for (const BodyShare& share : shares) wanted += share.force;
   } else {
-    state.surface_force.Reset();
-    state.penetration = 0;
+    state.Release();
+  }
+  const double energy_scale = state.mapping.energy_on_device();
+  if (input.sample_finite) {
+    state.energy.Measure({.position = measured.position,
+                          .velocity = measured.velocity,
+                          .duration_s = Seconds(time.previous_duration_ns),
+                          .surface_work = energy_scale * state.surface_work,
+                          .stored = energy_scale * state.surface_force.stored(),
+                          .penetration = state.penetration});
+    input.velocity = measured.velocity;
+    if (state.settings.safety.passivity_controller) input.brake = state.energy.Brake();
+  } else {
+    state.energy.Skip();
   }
 
   input.wanted = state.mapping.ForceOnDevice(wanted);
@@ -280,11 +314,13 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   }
   if (!on_device.allFinite()) on_device.setZero();
   state.safety.Displayed(on_device);
+  state.energy.Displayed(on_device, state.safety.ground(), input.wanted);
   const Vec3 displayed = state.mapping.ForceInWorld(on_device);
 
   state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
                      .pointer = kPointer,
                      .displayed = displayed,
+                     .for_ground = state.mapping.ForceInWorld(state.safety.ground()),
                      .wanted = shares,
                      .finger = state.sample.position});
   state.ledger.CloseIdle(kPointer, state.tick, [&](std::uint32_t body, std::uint32_t generation) {
@@ -303,6 +339,7 @@ void HapticStep::Stop(std::int64_t now_ns, protocol::HapticTick& message) noexce
   state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
                      .pointer = kPointer,
                      .displayed = Vec3::Zero(),
+                     .for_ground = Vec3::Zero(),
                      .wanted = {},
                      .finger = state.sample.position});
   state.Publish(time, Vec3::Zero(), ForceReason::kStopped, message);

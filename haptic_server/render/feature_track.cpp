@@ -26,7 +26,7 @@ bool IsSound(const protocol::Plane& plane) {
   const Vec3 normal = ToVec3(plane.normal);
   return IsPlace(ToVec3(plane.point)) && IsPlace(normal) && normal.norm() >= kZeroNormal &&
          plane.stiffness >= 0 && plane.stiffness <= kLargestStiffness && plane.damping >= 0 &&
-         plane.damping <= kLargestStiffness;
+         plane.damping <= kLargestStiffness && IsPlace(ToVec3(plane.velocity));
 }
 
 // Unit normals pass bit for bit.
@@ -136,6 +136,8 @@ std::span<const Surface> FeatureTrack::Surfaces() noexcept {
     surface.pointer = feature.identity.pointer;
     surface.body = feature.identity.body;
     surface.generation = feature.identity.generation;
+    surface.feature = feature.identity.feature;
+    surface.velocity = ToVec3(feature.identity.velocity);
     surface.stiffness = feature.identity.stiffness;
     surface.damping = feature.identity.damping;
     surface.plane = Displayed(feature);

@@ -26,9 +26,11 @@ struct Surface {
   std::uint32_t pointer = 0;
   std::uint32_t body = 0;
   std::uint32_t generation = 0;
-  double stiffness = 0;  // N/m; 0 = it brings none of its own
-  double damping = 0;    // N s/m, used only where stiffness > 0
-  HalfSpace plane;       // unit normal
+  std::uint32_t feature = 0;
+  Vec3 velocity = Vec3::Zero();  // m/s, of the body's material at the contact; not of the plane
+  double stiffness = 0;          // N/m; 0 = it brings none of its own
+  double damping = 0;            // N s/m, used only where stiffness > 0
+  HalfSpace plane;               // unit normal
 };
 
 /// Where a finger is when a frame arrives: decides which new features need recovery.

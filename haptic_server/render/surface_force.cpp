@@ -38,11 +38,13 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
 
   const double elapsed_s =
       period_s_ * static_cast<double>(std::max<std::int64_t>(elapsed_ticks, 1));
+  stored_ = 0;
   std::size_t share_count = 0;
   std::array<bool, kMaxContactPlanes> went_on{};
   for (std::size_t i = 0; i < count; ++i) {
     BodyContact& body = now[i];
     body.damping /= body.weight;
+    stored_ += 0.5 * body.spring.dot(body.displacement);
     body.point = contact.proxy - radius * body.displacement.stableNormalized();
     Vec3 before = Vec3::Zero();
     for (std::size_t j = 0; j < count_; ++j) {

@@ -41,7 +41,13 @@ class SurfaceForce {
                                     std::int64_t elapsed_ticks) noexcept;
 
   /// The finger is free, whatever came before. // RT:
-  void Reset() noexcept { count_ = 0; }
+  void Reset() noexcept {
+    count_ = 0;
+    stored_ = 0;
+  }
+
+  /// What the springs hold [J], as of the last Update. // RT:
+  double stored() const noexcept { return stored_; }
 
  private:
   struct BodyContact {
@@ -58,6 +64,7 @@ class SurfaceForce {
   double damping_;
   bool adhesion_;
   double period_s_;
+  double stored_ = 0;
   std::size_t count_ = 0;
   std::array<BodyContact, kMaxContactPlanes> contacts_;  // of the tick before
   std::array<BodyShare, kMaxShares> shares_;

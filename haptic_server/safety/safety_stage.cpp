@@ -47,6 +47,13 @@ ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
 
 void SafetyStage::MoveGain(const SafetyInput& input, bool no_force) noexcept {
   const double elapsed_s = std::max(Seconds(input.previous_duration_ns), 0.0);
+  if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
+    presence_ = 1;
+  } else if (input.peer == PeerState::kLost) {
+    presence_ = std::max(0.0, presence_ - elapsed_s / (settings_.fade_ms * 1e-3));
+  } else {
+    presence_ = 0;
+  }
   if (no_force) {
     gain_ = 0;
   } else if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
@@ -61,6 +68,15 @@ void SafetyStage::MoveGain(const SafetyInput& input, bool no_force) noexcept {
   }
 }
 
+Vec3 SafetyStage::LightDamping(const SafetyInput& input, ForceReason fault) const noexcept {
+  const bool too_fast = fault == ForceReason::kOverSpeed;
+  const bool fades = fault == ForceReason::kContact && input.peer == PeerState::kLost;
+  if (!(too_fast || fades) || input.stopped || !input.velocity.allFinite()) return Vec3::Zero();
+  Vec3 velocity = input.velocity;  // a wild measurement must not become a blow
+  Shorten(velocity, settings_.speed_limit_m_per_s);
+  return -presence_ * settings_.light_damping_ns_per_m * velocity;
+}
+
 Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   const ForceReason fault = Fault(input);
   const bool faulted = fault != ForceReason::kContact;
@@ -69,6 +85,10 @@ Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
 
   const bool wants = !no_force && !input.wanted.isZero(0);
   Vec3 target = no_force || gain_ == 0 ? Vec3(Vec3::Zero()) : Vec3(gain_ * input.wanted);
+  ground_ = LightDamping(input, fault);
+  const bool brakes = !no_force && gain_ > 0 && input.brake.allFinite() && !input.brake.isZero(0);
+  if (brakes) ground_ += gain_ * input.brake;
+  if (!ground_.isZero(0)) target += ground_;
   const bool capped = Shorten(target, settings_.force_cap_n);
   Vec3 change = target - displayed_;
   const bool slewed = Shorten(change, largest_step_n_);
@@ -89,6 +109,8 @@ Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
     reason_ = ForceReason::kWorldAbsent;
   } else if (input.clutched) {
     reason_ = ForceReason::kClutched;
+  } else if (brakes) {
+    reason_ = ForceReason::kPassivity;
   } else if (slewed) {
     reason_ = ForceReason::kSlewLimited;
   } else if (capped) {

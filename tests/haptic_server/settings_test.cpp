@@ -120,6 +120,8 @@ TEST_CASE("every key changes the settings") {
       "safety.force_cap_n=5",
       "safety.slew_limit_n_per_s=4000",
       "safety.speed_limit_m_per_s=2",
+      "safety.light_damping_ns_per_m=2",
+      "safety.passivity_controller=on",
       "safety.soft_start_ms=100",
       "safety.fade_ms=60",
       "safety.late_periods=2",
