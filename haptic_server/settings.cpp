@@ -43,6 +43,8 @@ ConfigSchema DaemonSchema(Settings& settings) {
                 "How surfaces move between two world frames.");
   schema.Number("render.finger_radius_mm", &render.finger_radius_mm, 0, 100,
                 "Radius of the sphere that stands for the finger.");
+  schema.Number("render.friction_stiffness_n_per_m", &render.friction_stiffness_n_per_m, 1, 1e5,
+                "Stiffness that holds a sticking finger, on surfaces that have friction.");
 
   SafetySettings& safety = settings.safety;
   schema.Number("safety.force_cap_n", &safety.force_cap_n, 0.1, 100,
@@ -213,6 +215,7 @@ void CheckSettings(const Settings& settings) {
   RequireNotNegative("render.stiffness_n_per_m", settings.render.stiffness_n_per_m);
   RequireNotNegative("render.damping_ns_per_m", settings.render.damping_ns_per_m);
   RequireNotNegative("render.finger_radius_mm", settings.render.finger_radius_mm);
+  RequirePositive("render.friction_stiffness_n_per_m", settings.render.friction_stiffness_n_per_m);
   RequirePositive("safety.force_cap_n", settings.safety.force_cap_n);
   RequirePositive("safety.slew_limit_n_per_s", settings.safety.slew_limit_n_per_s);
   RequirePositive("safety.speed_limit_m_per_s", settings.safety.speed_limit_m_per_s);

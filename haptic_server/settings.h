@@ -30,6 +30,7 @@ struct RenderSettings {
   bool adhesion = false;  // true: the literal damper of the paper, which may pull
   DisplayRule display = DisplayRule::kInterpolate;
   double finger_radius_mm = 10;
+  double friction_stiffness_n_per_m = 1000;  // of the stick spring, where surfaces have friction
 };
 
 struct SafetySettings {

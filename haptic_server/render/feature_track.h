@@ -15,7 +15,9 @@
 namespace rikiseki::haptic {
 
 /// A feature that appears with the finger already inside it starts below the finger and rises to
-/// its place within this time [s], so that the force does not step (Mark 1996: recovery time).
+/// its place within this time [s], so that the force does not step (Mark 1996: recovery time). One
+/// that vanishes while it is pressed stays where it is, and its force fades within the same time.
+/// A plane may bring a time of its own.
 inline constexpr double kRecoveryTime = 0.1;
 
 /// Coordinates beyond this [m] are taken for damage, not for places.
@@ -30,6 +32,9 @@ struct Surface {
   Vec3 velocity = Vec3::Zero();  // m/s, of the body's material at the contact; not of the plane
   double stiffness = 0;          // N/m; 0 = it brings none of its own
   double damping = 0;            // N s/m, used only where stiffness > 0
+  double static_friction = 0;    // of the finger, Coulomb
+  double dynamic_friction = 0;   // likewise
+  double strength = 1;           // 0..1, of its stiffness and damping: a vanished one fades
   HalfSpace plane;               // unit normal
 };
 
@@ -67,9 +72,12 @@ class FeatureTrack {
     Vec3 previous_normal, last_normal;
     double recovery = 0;       // m, how far below its place it started
     double recovery_left = 0;  // 1..0
+    bool leaving = false;      // no longer in the frame
+    double strength = 1;
   };
 
   HalfSpace Displayed(const Feature& feature) const noexcept;
+  bool IsPressed(const Feature& feature, const FingerState& finger) const noexcept;
 
   DisplayRule rule_;
   std::int64_t period_ns_;

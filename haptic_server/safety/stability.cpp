@@ -83,6 +83,7 @@ std::vector<std::string> DeviceWarnings(const Settings& settings) {
         " N/m at this rate and damping: without a hand that damps it, a contact buzzes");
   };
   judge("render.stiffness_n_per_m", settings.render.stiffness_n_per_m);
+  judge("render.friction_stiffness_n_per_m", settings.render.friction_stiffness_n_per_m);
   const double light = settings.safety.light_damping_ns_per_m;
   if (light * device.period_s / device.mass_kg > kDampingMargin) {
     warnings.push_back(

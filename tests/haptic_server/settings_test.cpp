@@ -117,6 +117,7 @@ TEST_CASE("every key changes the settings") {
       "render.adhesion=true",
       "render.display=hold",
       "render.finger_radius_mm=5",
+      "render.friction_stiffness_n_per_m=500",
       "safety.force_cap_n=5",
       "safety.slew_limit_n_per_s=4000",
       "safety.speed_limit_m_per_s=2",

@@ -582,6 +582,44 @@ TEST_CASE("light damping goes to the ground, and is over when the fade is") {
   REQUIRE(bench.Tick().isZero(0));
 }
 
+TEST_CASE("a surface that vanishes under the finger fades out, in the time that it asked for") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  settings.render.damping_ns_per_m = 0;
+  Bench bench(settings);
+  bench.planes[0].recovery_s = 0.2;
+  PressOn(bench);
+  bench.planes.clear();
+  bench.ticks_run = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Vec3 force = bench.Run(1);
+    REQUIRE((force - (1 - k / 200.0) * Vec3(-4, 0, 0)).norm() < 1e-9);
+    REQUIRE(bench.message.channels[0].state == protocol::ChannelState::kOpen);
+  }
+  REQUIRE(bench.Run(1).isZero(0));
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kNoContact);
+  REQUIRE(bench.message.channels[0].state == protocol::ChannelState::kClosed);
+}
+
+TEST_CASE("friction is part of the body's share: nothing of it goes to the ground") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  Bench bench(settings);
+  bench.planes[0].dynamic_friction = bench.planes[0].static_friction = 0.5;
+  PressOn(bench);
+  const ImpulseUnits before = bench.message.channels[0].impulse;
+  for (int k = 0; k < 200; ++k) {
+    bench.device.next.position.y() += 1e-4;
+    bench.Run(1);
+  }
+  REQUIRE((ToVec3(bench.message.pointers[0].force) - Vec3(-4, -2, 0)).norm() < 1e-6);
+  REQUIRE(bench.message.ground.impulse == ImpulseUnits{});
+  // 2 N along +y on the wall, but for the first 2 mm of stick.
+  const double dragged =
+      1e-12 * static_cast<double>(bench.message.channels[0].impulse[1] - before[1]);
+  REQUIRE(dragged == Approx(2 * 0.18 + 0.02).epsilon(0.02));
+}
+
 // A bare SPIDAR of 0.03 kg, drawn to the wall by 1 N.
 struct BareDevice {
   explicit BareDevice(Bench& used) : bench(used), step(ExactStep({0.03, 0.2, 0}, 1e-3)) {

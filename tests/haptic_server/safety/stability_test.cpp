@@ -47,6 +47,10 @@ TEST_CASE("a SPIDAR alone bears what the notes say") {
 TEST_CASE("settings that the bare device does not bear are named, the shipped ones are fine") {
   Settings settings;
   CHECK(DeviceWarnings(settings).empty());
+  settings.render.friction_stiffness_n_per_m = 5000;
+  REQUIRE(DeviceWarnings(settings).size() == 1);
+  CHECK_THAT(DeviceWarnings(settings)[0], Catch::Contains("render.friction_stiffness_n_per_m"));
+  settings.render.friction_stiffness_n_per_m = 100;
   settings.render.stiffness_n_per_m = 5000;
   REQUIRE(DeviceWarnings(settings).size() == 1);
   CHECK_THAT(DeviceWarnings(settings)[0],
