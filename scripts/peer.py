@@ -35,7 +35,7 @@ import threading
 import time
 
 VERSION = (0, 3)
-LAYOUT_HASH = 0xC46C6D16C57954F4  # 8.3
+LAYOUT_HASH = 0x2C03F6A567697CB9  # 8.3
 MAGIC = int.from_bytes(b"RIKISEKI", "little")
 BYTE_ORDER = 0x01020304
 HEADER_BYTES = 4096

@@ -49,6 +49,20 @@ bool SameFeature(const protocol::Plane& a, const protocol::Plane& b) {
          a.feature == b.feature;
 }
 
+HalfSpace InWorld(const Pose& pose_WB, const HalfSpace& plane_B) {
+  return {pose_WB * plane_B.point, pose_WB.orientation * plane_B.normal};
+}
+
+const protocol::LocalBody* FindLocal(const protocol::WorldFrame& frame,
+                                     const protocol::Plane& plane) {
+  const std::size_t count =
+      std::min<std::size_t>(frame.local_body_count, protocol::kMaxLocalBodies);
+  for (const protocol::LocalBody& local : std::span(frame.local_bodies).first(count)) {
+    if (local.body == plane.body && local.generation == plane.generation) return &local;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 FeatureTrack::FeatureTrack(DisplayRule rule, std::int64_t period_ns)
@@ -72,7 +86,7 @@ void FeatureTrack::Advance(std::int64_t ticks) noexcept {
   count_ = kept;
 }
 
-HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
+HalfSpace FeatureTrack::Interpolated(const Feature& feature) const noexcept {
   const double fraction = static_cast<double>(tick_) / ticks_per_frame_;
   const bool at_end = fraction >= 1;
   const double s = at_end ? 1 : fraction;
@@ -95,14 +109,20 @@ HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
   return shown;
 }
 
+HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
+  const HalfSpace shown = Interpolated(feature);
+  return feature.rides ? InWorld(feature.pose_WB, shown) : shown;
+}
+
 bool FeatureTrack::IsPressed(const Feature& feature, const FingerState& finger) const noexcept {
   const HalfSpace plane = Displayed(feature);
   return plane.normal.dot(plane.point - finger.position) + finger.radius >
          feature.recovery * feature.recovery_left;
 }
 
-void FeatureTrack::Receive(const protocol::WorldFrame& frame,
-                           std::span<const FingerState> fingers) noexcept {
+void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const FingerState> fingers,
+                           const LocalBodies& copies) noexcept {
+  FollowCopies(copies);
   std::array<bool, protocol::kMaxPlanes> paired{};
   std::size_t count = 0;
   const std::size_t planes = std::min<std::size_t>(frame.plane_count, protocol::kMaxPlanes);
@@ -114,6 +134,16 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
     feature.leaving = false;
     feature.last_point = WithoutDenormals(ToVec3(plane.point));
     feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));
+    const protocol::LocalBody* local = FindLocal(frame, plane);
+    const BodyState* copy = copies.Find(plane.body, plane.generation);
+    feature.rides = local != nullptr && copy != nullptr;
+    if (feature.rides) {
+      feature.pose_WB = copy->pose;
+      const Pose pose_BW = Pose{ToVec3(local->position), ToQuat(local->orientation)}.Inverse();
+      const HalfSpace last = InWorld(pose_BW, {feature.last_point, feature.last_normal});
+      feature.last_point = last.point;
+      feature.last_normal = last.normal;
+    }
     // Several planes of one identity pair in their order.
     std::size_t before = 0;
     while (before < count_ && (paired[before] || !SameFeature(features_[before].identity, plane))) {
@@ -122,9 +152,11 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
     if (before < count_) {
       paired[before] = true;
       const Feature& known = features_[before];
-      const HalfSpace now = rule_ == DisplayRule::kInterpolate
-                                ? Displayed(known)
-                                : HalfSpace{known.last_point, known.last_normal};
+      HalfSpace now = rule_ == DisplayRule::kInterpolate
+                          ? Interpolated(known)
+                          : HalfSpace{known.last_point, known.last_normal};
+      if (known.rides) now = InWorld(known.pose_WB, now);
+      if (feature.rides) now = InWorld(feature.pose_WB.Inverse(), now);
       feature.previous_point = now.point;
       feature.previous_normal = now.normal;
       feature.recovery = known.recovery;
@@ -134,8 +166,9 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
       feature.previous_point = feature.last_point;
       feature.previous_normal = feature.last_normal;
       const FingerState& finger = fingers[plane.pointer];
-      const double depth =
-          feature.last_normal.dot(feature.last_point - finger.position) + finger.radius;
+      const HalfSpace last{feature.last_point, feature.last_normal};
+      const HalfSpace shown = feature.rides ? InWorld(feature.pose_WB, last) : last;
+      const double depth = shown.normal.dot(shown.point - finger.position) + finger.radius;
       feature.recovery = depth > finger.allowed_depth ? depth - finger.allowed_depth : 0;
       feature.recovery_left = 1;
       feature.strength = 1;
@@ -147,7 +180,7 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
         !IsPressed(known, fingers[known.identity.pointer])) {
       continue;
     }
-    const HalfSpace now = Displayed(known);
+    const HalfSpace now = Interpolated(known);  // where it rides, it rides on
     Feature& feature = incoming_[count++];
     feature = known;
     feature.previous_point = feature.last_point = now.point;
@@ -168,7 +201,17 @@ void FeatureTrack::Clear() noexcept {
   tick_ = 0;
 }
 
-std::span<const Surface> FeatureTrack::Surfaces() noexcept {
+void FeatureTrack::FollowCopies(const LocalBodies& copies) noexcept {
+  for (std::size_t i = 0; i < count_; ++i) {
+    Feature& feature = features_[i];
+    if (!feature.rides) continue;
+    const BodyState* copy = copies.Find(feature.identity.body, feature.identity.generation);
+    if (copy != nullptr) feature.pose_WB = copy->pose;
+  }
+}
+
+std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexcept {
+  FollowCopies(copies);
   for (std::size_t i = 0; i < count_; ++i) {
     const Feature& feature = features_[i];
     Surface& surface = surfaces_[i];
@@ -177,14 +220,20 @@ std::span<const Surface> FeatureTrack::Surfaces() noexcept {
     surface.generation = feature.identity.generation;
     surface.feature = feature.identity.feature;
     surface.velocity = ToVec3(feature.identity.velocity);
+    const bool is_rough =
+        feature.identity.static_friction > 0 || feature.identity.dynamic_friction > 0;
+    const BodyState* copy =
+        feature.rides && is_rough ? copies.Find(surface.body, surface.generation) : nullptr;
     surface.stiffness = feature.identity.stiffness;
     surface.damping = feature.identity.damping;
     surface.static_friction = feature.identity.static_friction;
     surface.dynamic_friction = feature.identity.dynamic_friction;
     surface.strength = feature.strength;
+    surface.fixed = feature.identity.inverse_mass == 0;
     surface.plane = Displayed(feature);
     const double below = feature.recovery * feature.recovery_left;
     if (below > 0) surface.plane.point -= below * surface.plane.normal;
+    if (copy != nullptr) surface.velocity = copy->VelocityAt(surface.plane.point);
   }
   return std::span(surfaces_).first(count_);
 }

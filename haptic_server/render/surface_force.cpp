@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "haptic_server/render/feature_track.h"
+
 namespace rikiseki::haptic {
 
 SurfaceForce::SurfaceForce(const RenderSettings& settings, double period_s)
@@ -26,9 +28,19 @@ Vec3 SurfaceForce::FrictionOf(const BodyContact& body, const Vec3& force, const 
                          elapsed_s);
 }
 
-std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
-                                                const ContactSolution& contact, double radius,
-                                                std::int64_t elapsed_ticks) noexcept {
+BodyShare SurfaceForce::ShareOf(const BodyContact& body, const Vec3& force) noexcept {
+  return {.body = body.body,
+          .generation = body.generation,
+          .force = force,
+          .point = body.point,
+          .fixed = body.fixed,
+          .stiffness = body.stiffness,
+          .damping = body.damping};
+}
+
+std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
+                                          const ContactSolution& contact, double radius,
+                                          std::int64_t elapsed_ticks) noexcept {
   std::array<BodyContact, kMaxContactPlanes> now;
   std::size_t count = 0;
   for (std::size_t i = 0; i < std::min(surfaces.size(), kMaxContactPlanes); ++i) {
@@ -43,13 +55,15 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
       now[count++] = {};
       body->body = surface.body;
       body->generation = surface.generation;
+      body->fixed = surface.fixed;
     }
     const bool own = surface.stiffness > 0;
     const Vec3 displacement = multiplier * surface.plane.normal;
     body->displacement += displacement;
-    body->spring += surface.strength * (own ? surface.stiffness : stiffness_) * displacement;
-    body->damping += surface.strength * (own ? surface.damping : damping_) *
-                     multiplier;  // weighted; divided below
+    const double stiffness = surface.strength * (own ? surface.stiffness : stiffness_);
+    body->spring += stiffness * displacement;
+    body->stiffness += stiffness * multiplier;  // weighted, like damping; divided below
+    body->damping += surface.strength * (own ? surface.damping : damping_) * multiplier;
     body->weight += multiplier;
     if (surface.static_friction > 0 || surface.dynamic_friction > 0) {
       body->static_friction += multiplier * surface.static_friction;
@@ -69,6 +83,7 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
   std::array<bool, kMaxContactPlanes> went_on{};
   for (std::size_t i = 0; i < count; ++i) {
     BodyContact& body = now[i];
+    body.stiffness /= body.weight;
     body.damping /= body.weight;
     stored_ += 0.5 * body.spring.dot(body.displacement);
     body.point = contact.proxy - radius * body.displacement.stableNormalized();
@@ -84,7 +99,8 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
     if (body.static_friction > 0 || body.dynamic_friction > 0) {
       force += FrictionOf(body, force, way, elapsed_s);
     }
-    shares_[share_count++] = {body.body, body.generation, force, body.point};
+    shares_[share_count++] = ShareOf(body, force);
+    shares_[share_count - 1].displacement = body.displacement;
   }
   if (friction_.holds()) {
     friction_.EndTick();
@@ -96,7 +112,7 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
       const BodyContact& body = contacts_[j];
       if (went_on[j]) continue;
       const Vec3 force = -body.damping * body.displacement / elapsed_s;
-      shares_[share_count++] = {body.body, body.generation, force, body.point};
+      shares_[share_count++] = ShareOf(body, force);
     }
   }
   std::copy_n(now.begin(), count, contacts_.begin());

@@ -9,7 +9,6 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
-#include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/friction.h"
 #include "haptic_server/settings.h"
 
@@ -19,18 +18,25 @@ namespace rikiseki::haptic {
 struct BodyShare {
   std::uint32_t body = 0;
   std::uint32_t generation = 0;
-  Vec3 force = Vec3::Zero();  // N, on the user
-  Vec3 point = Vec3::Zero();  // m, where the opposite impulse acts on the body: D - r n
+  Vec3 force = Vec3::Zero();         // N, on the user
+  Vec3 point = Vec3::Zero();         // m, where the opposite impulse acts on the body: D - r n
+  bool fixed = false;                // the body cannot move: its share belongs to the ground
+  Vec3 displacement = Vec3::Zero();  // m, e_b
+  double stiffness = 0;              // N/m, and damping, N s/m, that made the force
+  double damping = 0;
 };
 
 inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
+
+struct Surface;
 
 /// The contact law of one pointer. For body b with e_b = sum of its multiplier_i * normal_i, so
 /// that the e_b add up to e = D - C:  f_b = sum of k_i multiplier_i normal_i + d_b (e_b - e_b of
 /// the tick before)/T. With equal k and d this is the paper's f = k e + d (e - e_before)/T, split
 /// without remainder. A surface that fades is as much weaker. Without `adhesion` a body only
-/// pushes: f_b is dropped where f_b . e_b <= 0, and when the finger is free. Where surfaces have friction, the tangential force of friction.h is
-/// part of the share; where they have none, it costs and changes nothing.
+/// pushes: f_b is dropped where f_b . e_b <= 0, and when the finger is free. Where surfaces have
+/// friction, the tangential force of friction.h is part of the share; where they have none, it costs
+/// and changes nothing.
 class SurfaceForce {
  public:
   SurfaceForce(const RenderSettings& settings, double period_s);
@@ -38,9 +44,8 @@ class SurfaceForce {
   /// `elapsed_ticks` is 1, or more after missed deadlines: the difference quotient runs over that
   /// many *nominal* periods, so that jitter of the wake-up does not become jitter of the force. //
   /// RT:
-  std::span<const BodyShare> Update(std::span<const Surface> surfaces,
-                                    const ContactSolution& contact, double radius,
-                                    std::int64_t elapsed_ticks) noexcept;
+  std::span<BodyShare> Update(std::span<const Surface> surfaces, const ContactSolution& contact,
+                              double radius, std::int64_t elapsed_ticks) noexcept;
 
   /// The finger is free, whatever came before. // RT:
   void Reset() noexcept {
@@ -56,6 +61,8 @@ class SurfaceForce {
   struct BodyContact {
     std::uint32_t body = 0;
     std::uint32_t generation = 0;
+    bool fixed = false;
+    double stiffness = 0;
     double damping = 0;
     Vec3 displacement = Vec3::Zero();  // e_b
     Vec3 spring = Vec3::Zero();        // N
@@ -70,6 +77,7 @@ class SurfaceForce {
 
   Vec3 FrictionOf(const BodyContact& body, const Vec3& force, const Vec3& way,
                   double elapsed_s) noexcept;
+  static BodyShare ShareOf(const BodyContact& body, const Vec3& force) noexcept;
 
   double stiffness_;
   double damping_;

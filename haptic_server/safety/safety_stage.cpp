@@ -47,24 +47,19 @@ ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
 
 void SafetyStage::MoveGain(const SafetyInput& input, bool no_force) noexcept {
   const double elapsed_s = std::max(Seconds(input.previous_duration_ns), 0.0);
-  if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
-    presence_ = 1;
-  } else if (input.peer == PeerState::kLost) {
-    presence_ = std::max(0.0, presence_ - elapsed_s / (settings_.fade_ms * 1e-3));
-  } else {
-    presence_ = 0;
-  }
-  if (no_force) {
+  const bool shows = input.peer == PeerState::kLive || input.peer == PeerState::kLate;
+  const bool fades = input.peer == PeerState::kLost;
+  const double faded = elapsed_s / (settings_.fade_ms * 1e-3);
+  presence_ = shows ? 1 : fades ? std::max(0.0, presence_ - faded) : 0;
+  if (no_force || (!shows && !fades)) {
     gain_ = 0;
-  } else if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
+  } else if (shows) {
     // A stall must not skip the soft start: it counts as one period.
     const double soft_start_s = settings_.soft_start_ms * 1e-3;
     gain_ =
         soft_start_s > 0 ? std::min(1.0, gain_ + std::min(elapsed_s, period_s_) / soft_start_s) : 1;
-  } else if (input.peer == PeerState::kLost) {
-    gain_ = std::max(0.0, gain_ - elapsed_s / (settings_.fade_ms * 1e-3));
   } else {
-    gain_ = 0;
+    gain_ = std::max(0.0, gain_ - elapsed_s / (settings_.fade_ms * 1e-3));
   }
 }
 
