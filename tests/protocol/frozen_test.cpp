@@ -99,13 +99,13 @@ TEST_CASE("a frozen world segment of this version attaches and decodes") {
 }
 
 TEST_CASE("older segments are refused: under major 0 the minor version must be equal") {
-  for (const std::string minor : {"1", "2"}) {
+  for (const char* minor : {"1", "2"}) {
     for (const Role role : {Role::kHaptic, Role::kWorld}) {
       const Thawed segment(std::string(RoleName(role)) + "-0." + minor + ".bin", role);
       const AttachResult result = AttachTo(segment, role);
       CHECK(result.status == AttachStatus::kIncompatible);
-      CHECK_THAT(result.text,
-                 Catch::Contains("version_minor is " + minor + ", this program knows 3"));
+      CHECK_THAT(result.text, Catch::Contains(std::string("version_minor is ") + minor +
+                                              ", this program knows 3"));
     }
   }
 }

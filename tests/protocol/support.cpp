@@ -172,6 +172,11 @@ WorldFrame Generator::Frame() {
     m.planes[i].dynamic_friction = Positive();
     m.planes[i].recovery_s = Positive();
   }
+  const bool mobility = Integer(1) == 1;
+  for (std::uint32_t i = 0; mobility && i < m.plane_count; ++i) {
+    constexpr double kSaid[] = {0, kMobilityNotSaid};
+    m.planes[i].inverse_mass = Integer(1) == 1 ? Positive() : kSaid[Integer(1)];
+  }
   if (Integer(1) == 1) {
     m.local_body_count = 1 + Small(kMaxLocalBodies - 1);
     m.local_substep_ns = 1 + Integer(10'000'000);
@@ -195,7 +200,7 @@ LocalBody Generator::OneLocalBody(std::uint32_t body) {
   b.contact_count = Small(kMaxContactPlanes);
   for (std::uint32_t i = 0; i < b.contact_count; ++i) {
     b.contacts[i] = {Small(99),  Small(99), Triple(),   Direction(), Real(),
-                     Positive(), Triple(),  Positive(), Triple()};
+                     Positive(), Triple(),  Positive(), Triple(),    Positive()};
   }
   return b;
 }
