@@ -100,6 +100,19 @@ void PrintLoop(const Json& side) {
             << "  work       " << Durations(side["duration_us"]) << "\n";
 }
 
+void PrintEnergy(const Json& energy) {
+  const double injected_mj = energy["injected_j"].get<double>() * 1e3;
+  std::cout << "  energy     the rendering has " << (injected_mj > 0 ? "given " : "absorbed ")
+            << Number(std::abs(injected_mj), 3) << " mJ, the device dissipated "
+            << Number(energy["dissipated_j"].get<double>() * 1e3, 3) << " mJ"
+            << (energy["controller_acts"].get<bool>() ? "; the passivity controller brakes" : "")
+            << "\n  contact    "
+            << (energy["unstable"].get<bool>()
+                    ? "UNSTABLE: it gives more energy than the device can dissipate"
+                    : "no sign of instability")
+            << ", flagged " << energy["times_flagged"] << " times since the start\n";
+}
+
 void PrintHaptic(const Json& haptic) {
   if (!haptic["attached"].get<bool>()) {
     std::cout << "HAPTIC  not there: " << haptic["why"].get<std::string>() << "\n";
@@ -126,6 +139,7 @@ void PrintHaptic(const Json& haptic) {
             << "  world      " << haptic["peer"]["state"].get<std::string>() << ", epoch "
             << haptic["peer"]["epoch"] << ", newest frame "
             << Number(haptic["peer"]["feature_age_ms"], 1) << " ms old\n";
+  PrintEnergy(haptic["energy"]);
   PrintLoop(haptic);
   std::cout << "  faults     " << haptic["page_faults"]["minor"] << " minor, "
             << haptic["page_faults"]["major"] << " major; largest force "
