@@ -163,15 +163,16 @@ void HapticPlayer::Publish(const HapticTick& tick) {
 }
 
 void HapticPlayer::PublishSpoilt(
-    const HapticTick& tick,
-    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil) {
+    const HapticTick& tick, const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+    std::int64_t stamp_offset_ns) {
   published_[segment_->epoch()].spoilt[tick.tick] = true;
-  PublishAs(tick, spoil);
+  PublishAs(tick, spoil, stamp_offset_ns);
 }
 
 void HapticPlayer::PublishAs(
     const HapticTick& tick,
-    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change) {
+    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change,
+    std::int64_t stamp_offset_ns) {
   Remember(tick);
   std::vector<std::uint64_t> words(kHapticTickBytes / 8);
   Encoded encoded = Encode(tick, words);
@@ -179,7 +180,12 @@ void HapticPlayer::PublishAs(
   const std::size_t stored =
       std::min<std::size_t>(encoded.used_bytes, writer_.ring().payload_bytes) / 8;
   writer_.Publish(std::span<const std::uint64_t>(words).first(stored), encoded,
-                  static_cast<std::uint64_t>(MonotonicNow()));
+                  static_cast<std::uint64_t>(MonotonicNow() + stamp_offset_ns));
+}
+
+void HapticPlayer::Jump(std::uint64_t numbers) {
+  next_tick_ += numbers;
+  writer_.SetPublished(writer_.published() + numbers);
 }
 
 void HapticPlayer::Drain() {

@@ -89,12 +89,17 @@ class HapticPlayer {
   std::uint64_t named_epoch = 0;  // 0 = the world's
   HapticTick NextTick();
   void Publish(const HapticTick& tick);
-  /// A sound message, but `change` has the last word on its bytes.
+  /// A sound message, but `change` has the last word on its bytes. The stamp is `stamp_offset_ns`
+  /// later than now.
   void PublishAs(const HapticTick& tick,
-                 const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change);
+                 const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change,
+                 std::int64_t stamp_offset_ns = 0);
   /// The number counts as used; the world must never acknowledge it.
   void PublishSpoilt(const HapticTick& tick,
-                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil);
+                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+                     std::int64_t stamp_offset_ns = 0);
+  /// The numbers of messages and ticks grow by `numbers` at once.
+  void Jump(std::uint64_t numbers);
   /// Ticks up to `last` count as performed, with the totals of the newest.
   void PerformedAlike(std::uint64_t last) { published_[segment_->epoch()].alike_until = last; }
   std::uint64_t tick() const { return next_tick_ - 1; }

@@ -10,6 +10,8 @@ namespace rikiseki::protocol::check {
 namespace {
 
 constexpr std::int64_t kWholeNs = 400;  // how long a message stays whole: as long as a copy takes
+constexpr std::int64_t kFarFutureNs = 10'000'000'000;
+constexpr std::uint64_t kLeap = 10'000'000;  // messages: hours of ticks
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 using Words = std::vector<std::uint64_t>;
@@ -35,7 +37,7 @@ double Frames(const HapticPlayer& player, double frames) {
 }
 
 /// Spoilt ticks among good ones: none is acknowledged, what they brought comes with the next.
-void Refuses(HapticPlayer& player, const Spoil& spoil) {
+void Refuses(HapticPlayer& player, const Spoil& spoil, std::int64_t stamp_offset_ns = 0) {
   player.Touch();
   const std::uint64_t sums = player.monitor().breaches(kSum);
   const std::uint64_t accepted = player.monitor().breaches(kRefused);
@@ -45,7 +47,7 @@ void Refuses(HapticPlayer& player, const Spoil& spoil) {
   for (int i = 0; i < 6; ++i) {
     player.Push({Units(i % 2 == 0 ? 0.001 : -0.001), 0, 0});
     player.publishing = false;
-    player.PublishSpoilt(player.NextTick(), spoil);
+    player.PublishSpoilt(player.NextTick(), spoil, stamp_offset_ns);
     player.Until([&] { return player.newest().frame > frame + static_cast<std::uint64_t>(i); }, 1);
     player.publishing = true;
     player.Run(0.005);
@@ -137,6 +139,47 @@ void Backwards(HapticPlayer& player) {
   player.writer().SetPublished(number);
   player.publishing = true;
   Detached(player, "the counter ran backwards");
+}
+
+// Of eight slots, so that the leap fills them all at once, and a lapped reader finds the message that it
+// goes on with.
+void Jumps(HapticPlayer& player) {
+  constexpr std::uint32_t kSlots = 8;
+  player.Touch();
+  const Plane box = player.touched();
+  player.Close();
+  player.Open({}, SegmentState::kReady, kSlots);
+  player.OpenChannel(box.body, box.generation);
+  player.Couple();
+  player.Run(Frames(player, 2));
+  player.Jump(kLeap);
+  for (std::uint32_t i = 0; i < kSlots; ++i) player.Publish(player.NextTick());
+  AsShould([&] { Detached(player, "published grew by ten million messages at once"); });
+}
+
+void FromTheFuture(HapticPlayer& player) {
+  Refuses(
+      player, [](Words&, Encoded&) {}, kFarFutureNs);
+}
+
+// Older than the message before, each as the newest of what one frame takes; no MUST.
+void FromThePast(HapticPlayer& player) {
+  player.Touch();
+  Require(player.Settle(), "ticks are not acknowledged");
+  bool taken = false;
+  for (int i = 0; i < 4; ++i) {
+    player.publishing = false;
+    const HapticTick tick = player.NextTick();
+    player.PublishAs(
+        tick, [](Words&, Encoded&) {}, -1'000'000'000);
+    const std::uint64_t frame = player.newest().frame;
+    player.Until([&] { return player.newest().frame > frame + 1; }, 1);
+    taken = taken || player.newest().acked_tick == tick.tick;
+    player.publishing = true;
+    player.Run(0.005);
+  }
+  Require(player.Settle(), "good ticks after four with stamps of the past are not acknowledged");
+  if (taken) NotStrict("a tick is taken whose stamp is a second before that of the tick before");
 }
 
 void FirstLook(HapticPlayer& player) {
@@ -432,6 +475,9 @@ constexpr WorldCase kNonsense[] = {
     {"world/9.2-7/far-finger", FarFinger},
     {"world/9.2-6/ten-in-a-row", TenInARow},
     {"world/9.2-6/backwards", Backwards},
+    {"world/9.2-8/future-stamp", FromTheFuture},
+    {"world/9.2-9/jump", Jumps},
+    {"world/9.2-10/past-stamp", FromThePast},
     {"world/4.3-1/first-look", FirstLook},
     {"world/4.3-1/second-look", SecondLook},
     {"world/8.2-7/unknown-blocks", UnknownBlocks},

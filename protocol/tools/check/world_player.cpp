@@ -174,7 +174,8 @@ void WorldPlayer::Publish(const WorldFrame& frame) {
 
 void WorldPlayer::PublishSpoilt(
     const WorldFrame& frame,
-    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil) {
+    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+    std::int64_t stamp_offset_ns) {
   judge_.Poison(segment_->epoch(), frame.frame);
   std::vector<std::uint64_t> words(kWorldFrameBytes / 8);
   Encoded encoded = Encode(frame, words);
@@ -182,7 +183,12 @@ void WorldPlayer::PublishSpoilt(
   const std::size_t room = writer_.ring().payload_bytes;
   const std::size_t stored = std::min<std::size_t>(encoded.used_bytes, room) / 8;
   writer_.Publish(std::span<const std::uint64_t>(words).first(stored), encoded,
-                  static_cast<std::uint64_t>(MonotonicNow()));
+                  static_cast<std::uint64_t>(MonotonicNow() + stamp_offset_ns));
+}
+
+void WorldPlayer::Jump(std::uint64_t numbers) {
+  frame_ += numbers;
+  writer_.SetPublished(writer_.published() + numbers);
 }
 
 void WorldPlayer::Step() {

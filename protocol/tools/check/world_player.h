@@ -73,9 +73,12 @@ class WorldPlayer {
   WorldFrame NextFrame();  // the next number, our planes, our ack
   void Publish(const WorldFrame& frame);
   /// Publishes the bytes of `frame` after `spoil` changed them; the number counts as used, and the
-  /// haptic side must never name it.
+  /// haptic side must never name it. The stamp is `stamp_offset_ns` later than now.
   void PublishSpoilt(const WorldFrame& frame,
-                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil);
+                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+                     std::int64_t stamp_offset_ns = 0);
+  /// The numbers of messages and frames grow by `numbers` at once.
+  void Jump(std::uint64_t numbers);
   std::uint64_t frame() const { return frame_; }
   RawWriter& writer() { return writer_; }
 
