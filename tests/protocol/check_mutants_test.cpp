@@ -103,6 +103,13 @@ TEST_CASE("the kit fails every haptic mutant in the case that is about it") {
       {HapticFault::kBooksAnyAck, "haptic/7.6-4/false-acks"},
       {HapticFault::kNoThreeFrames, "haptic/5.5-3/three-frames"},
       {HapticFault::kOverCap, "haptic/5.5-7/pressed-hard"},
+      {HapticFault::kNoClock, "haptic/9.2-8/future-stamp"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-3/mobility"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-3/contact-radius"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-3/local-mass"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-2/contact-count"},
+      {HapticFault::kChannelForFixed, "haptic/7.2-10/fixed-body"},
+      {HapticFault::kLosesLocal, "haptic/7.7-9/local-body"},
   }));
   std::string text;
   const Verdict verdict = JudgedHaptic(fault, id, text);
@@ -130,11 +137,23 @@ TEST_CASE("the kit fails every world mutant in the case that is about it") {
       {WorldFault::kNoSecondLook, "world/4.3-1/second-look"},
       {WorldFault::kIgnoresHash, "world/8.2-3/hash"},
       {WorldFault::kPublishBeforeWrite, "world/4.1-2/published"},
+      {WorldFault::kNoClock, "world/9.2-8/future-stamp"},
+      {WorldFault::kSaysFixed, "world/6.2-13/mobility"},
+      {WorldFault::kLocalInstead, "world/7.7-6/local-state"},
+      {WorldFault::kRestsDeep, "world/6.2-14/resting-gaps"},
+      {WorldFault::kContactTwice, "world/6.2-15/contacts-once"},
   }));
   std::string text;
   const Verdict verdict = JudgedWorld(fault, id, text);
   INFO(id << ": " << text);
   CHECK(verdict == Verdict::kFailed);
+}
+
+TEST_CASE("what breaks a SHOULD is told, and fails strictly only") {
+  std::string text;
+  CHECK(JudgedHaptic(HapticFault::kNoClock, "haptic/9.2-9/jump", text) == Verdict::kNonStrict);
+  INFO(text);
+  CHECK(JudgedWorld(WorldFault::kNoClock, "world/9.2-9/jump", text) == Verdict::kNonStrict);
 }
 
 TEST_CASE("every case cites a sentence of SPEC.md, under an id of its own") {
