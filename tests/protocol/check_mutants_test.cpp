@@ -8,6 +8,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "protocol/attach.h"
 #include "protocol/owner.h"
 #include "protocol/tools/check/suite.h"
 #include "tests/protocol/support.h"
@@ -154,6 +155,35 @@ TEST_CASE("what breaks a SHOULD is told, and fails strictly only") {
   CHECK(JudgedHaptic(HapticFault::kNoClock, "haptic/9.2-9/jump", text) == Verdict::kNonStrict);
   INFO(text);
   CHECK(JudgedWorld(WorldFault::kNoClock, "world/9.2-9/jump", text) == Verdict::kNonStrict);
+}
+
+TEST_CASE("inspect tells what can move, and fails what contradicts itself") {
+  const auto inspected = [](WorldFault fault, std::string& text) {
+    const std::string instance = FreshInstance();
+    const MiniWorld world(instance, fault);
+    const MiniHaptic haptic(instance, HapticFault::kNone);
+    std::ostringstream out;
+    Reporter reporter(out, true);
+    for (const Role role : {Role::kHaptic, Role::kWorld}) {
+      REQUIRE(Eventually([&] {
+        return Attach({.instance = instance, .role = role, .required = {}, .owners = {}}).status ==
+               AttachStatus::kAttached;
+      }));
+    }
+    check::InspectBoth(instance, {}, reporter);
+    text = out.str();
+    return reporter.ExitStatus();
+  };
+  std::string text;
+  const int sound = inspected(WorldFault::kNone, text);
+  INFO(text);
+  CHECK(sound == 0);
+  CHECK_THAT(text, Catch::Contains("1 planes, 0 of bodies that cannot move, 0 that do not say, the "
+                                   "others yield by 1 to 1 1/kg"));
+  CHECK_THAT(text, Catch::Contains("2 local bodies, substep 1.0 ms; body 1 (generation 1) 1 kg, 1 "
+                                   "contact planes (body 0 gap 0 m)"));
+  CHECK(inspected(WorldFault::kSaysFixed, text) == 1);
+  CHECK_THAT(text, Catch::Contains("FAILED        world/6.2-13/mobility: body 1 is local"));
 }
 
 TEST_CASE("every case cites a sentence of SPEC.md, under an id of its own") {
