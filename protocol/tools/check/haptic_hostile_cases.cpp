@@ -7,6 +7,7 @@
 #include "common/clock.h"
 #include "protocol/tools/check/haptic_cases.h"
 #include "protocol/tools/check/haptic_refusal.h"
+#include "protocol/tools/check/header_cases.h"
 
 namespace rikiseki::protocol::check {
 namespace {
@@ -296,78 +297,6 @@ void Flood(WorldPlayer& player) {
   if (!displayed) Inform("a world of 20 kHz is not displayed");
 }
 
-void NeverNamed(WorldPlayer& player, const std::function<void(SegmentHeader&)>& alter,
-                SegmentState state, const std::string& what, double seconds = 0.3) {
-  player.Open(alter, state);
-  const std::uint64_t epoch = player.segment().epoch();
-  const std::size_t from = player.seen().size();
-  player.Run(seconds);
-  for (std::size_t i = from; i < player.seen().size(); ++i) {
-    Require(player.seen()[i].world_epoch != epoch, "frames are displayed though " + what);
-    Require(Norm(player.seen()[i].force) < kZeroForce, "force though " + what);
-  }
-}
-
-void Major(WorldPlayer& player) {
-  player.Leave();
-  NeverNamed(
-      player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
-      "version_major differs");
-  player.Leave();
-}
-void Minor(WorldPlayer& player) {
-  if (kVersionMajor != 0) Unimplemented("from 1.0 on minor versions may differ");
-  player.Leave();
-  NeverNamed(
-      player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
-      "version_minor differs under major 0");
-  player.Leave();
-}
-void Hash(WorldPlayer& player) {
-  player.Leave();
-  NeverNamed(
-      player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
-      "layout_hash differs under the same version");
-  player.Leave();
-}
-void Initialising(WorldPlayer& player) {
-  player.Leave();
-  NeverNamed(player, {}, SegmentState::kInitialising, "state is initialising");
-  player.segment().SetState(SegmentState::kReady);
-  player.Couple();
-}
-
-void WrongHeaders(WorldPlayer& player) {
-  struct Wrong {
-    const char* what;
-    void (*alter)(SegmentHeader&);
-  };
-  constexpr Wrong kWrong[] = {
-      {"magic is wrong", [](SegmentHeader& h) { h.magic ^= 1; }},
-      {"byte_order is wrong", [](SegmentHeader& h) { h.byte_order = 0x04030201; }},
-      {"header_bytes is wrong", [](SegmentHeader& h) { h.header_bytes = 8192; }},
-      {"role is haptic", [](SegmentHeader& h) { h.role = 1; }},
-      {"epoch is 0", [](SegmentHeader& h) { h.epoch = 0; }},
-      {"there are 17 streams", [](SegmentHeader& h) { h.stream_count = 17; }},
-      {"segment_bytes is more than there is", [](SegmentHeader& h) { h.segment_bytes <<= 8; }},
-      {"the ring ends outside", [](SegmentHeader& h) { h.stream[0].slot_count = 65536; }},
-      {"slot_count is no power of two", [](SegmentHeader& h) { h.stream[0].slot_count = 7; }},
-      {"slot_stride is 0", [](SegmentHeader& h) { h.stream[0].slot_stride = 0; }},
-      {"the counter lies in the ring",
-       [](SegmentHeader& h) { h.stream[0].cursor_offset = h.stream[0].ring_offset; }},
-      {"the counter is not aligned", [](SegmentHeader& h) { h.stream[0].cursor_offset += 8; }},
-      {"the ring lies at the end of the address space",
-       [](SegmentHeader& h) { h.stream[0].ring_offset = ~std::uint64_t{127}; }},
-      {"there is no world.frame", [](SegmentHeader& h) { h.stream[0].type_id = 999; }},
-  };
-  player.Leave();
-  for (const Wrong& wrong : kWrong) {
-    NeverNamed(player, wrong.alter, SegmentState::kReady, wrong.what, 0.2);
-  }
-  player.Leave();
-  player.Couple();
-}
-
 constexpr HapticCase kCases[] = {
     {"haptic/9.2-3/not-a-number", NotANumber},
     {"haptic/9.2-3/infinite", Infinite},
@@ -390,11 +319,11 @@ constexpr HapticCase kCases[] = {
     {"haptic/4.3-1/second-look", SecondLook},
     {"haptic/8.2-7/unknown-blocks", UnknownBlocks},
     {"haptic/6.1-1/flood", Flood},
-    {"haptic/8.2-1/major", Major},
-    {"haptic/8.2-2/minor", Minor},
-    {"haptic/8.2-3/hash", Hash},
-    {"haptic/5.2-9/initialising", Initialising},
-    {"haptic/9.1-1/wrong-headers", WrongHeaders},
+    {"haptic/8.2-1/major", RefusesMajor},
+    {"haptic/8.2-2/minor", RefusesMinor},
+    {"haptic/8.2-3/hash", RefusesHash},
+    {"haptic/5.2-9/initialising", WaitsForReady},
+    {"haptic/9.1-1/wrong-headers", RefusesWrongHeaders},
 };
 
 }  // namespace
