@@ -9,18 +9,10 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
-#include "haptic_server/render/feature_track.h"
+#include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
-
-/// What one body does to the finger in this tick.
-struct BodyShare {
-  std::uint32_t body = 0;
-  std::uint32_t generation = 0;
-  Vec3 force = Vec3::Zero();  // N, on the user
-  Vec3 point = Vec3::Zero();  // m, where the opposite impulse acts on the body: D - r n
-};
 
 inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
 
@@ -36,9 +28,8 @@ class SurfaceForce {
   /// `elapsed_ticks` is 1, or more after missed deadlines: the difference quotient runs over that
   /// many *nominal* periods, so that jitter of the wake-up does not become jitter of the force. //
   /// RT:
-  std::span<const BodyShare> Update(std::span<const Surface> surfaces,
-                                    const ContactSolution& contact, double radius,
-                                    std::int64_t elapsed_ticks) noexcept;
+  std::span<BodyShare> Update(std::span<const Surface> surfaces, const ContactSolution& contact,
+                              double radius, std::int64_t elapsed_ticks) noexcept;
 
   /// The finger is free, whatever came before. // RT:
   void Reset() noexcept { count_ = 0; }
@@ -47,12 +38,16 @@ class SurfaceForce {
   struct BodyContact {
     std::uint32_t body = 0;
     std::uint32_t generation = 0;
+    bool fixed = false;
+    double stiffness = 0;
     double damping = 0;
     Vec3 displacement = Vec3::Zero();  // e_b
     Vec3 spring = Vec3::Zero();        // N
     Vec3 point = Vec3::Zero();
     double weight = 0;
   };
+
+  static BodyShare ShareOf(const BodyContact& body, const Vec3& force) noexcept;
 
   double stiffness_;
   double damping_;

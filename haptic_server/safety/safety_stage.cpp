@@ -47,17 +47,16 @@ ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
 
 void SafetyStage::MoveGain(const SafetyInput& input, bool fault) noexcept {
   const double elapsed_s = std::max(Seconds(input.previous_duration_ns), 0.0);
-  if (fault) {
+  const bool shows = input.peer == PeerState::kLive || input.peer == PeerState::kLate;
+  if (fault || (!shows && input.peer != PeerState::kLost)) {
     gain_ = 0;
-  } else if (input.peer == PeerState::kLive || input.peer == PeerState::kLate) {
+  } else if (shows) {
     // A stall must not skip the soft start: it counts as one period.
     const double soft_start_s = settings_.soft_start_ms * 1e-3;
     gain_ =
         soft_start_s > 0 ? std::min(1.0, gain_ + std::min(elapsed_s, period_s_) / soft_start_s) : 1;
-  } else if (input.peer == PeerState::kLost) {
-    gain_ = std::max(0.0, gain_ - elapsed_s / (settings_.fade_ms * 1e-3));
   } else {
-    gain_ = 0;
+    gain_ = std::max(0.0, gain_ - elapsed_s / (settings_.fade_ms * 1e-3));
   }
 }
 

@@ -43,6 +43,7 @@ bool CoupledRun::Tick() {
 }
 
 void CoupledRun::TickWorld(double period_s) {
+  if (lapped_) world_.Consume(haptic_tick_);
   world_.Tick(period_s, world_frame_);
   frame_is_new_ = true;
 }
@@ -58,7 +59,7 @@ void CoupledRun::TickHaptic() {
                                  .frame = frame_is_new_ ? &world_frame_ : nullptr};
   haptic_.Tick(time, world, haptic_tick_);
   frame_is_new_ = false;
-  world_.Consume(haptic_tick_);
+  if (!lapped_) world_.Consume(haptic_tick_);
   ++tick_;
 }
 

@@ -32,6 +32,10 @@ class CoupledRun {
              const world::Settings& world_settings, const world::Scene& scene,
              std::unique_ptr<world::DynamicsWorld> dynamics, int phase_ticks);
 
+  /// From now on the world sees only the newest message before each of its ticks, as if all others
+  /// had been overwritten unread.
+  void LapTheWorld() { lapped_ = true; }
+
   /// When tick 0 happens, in virtual time.
   static std::int64_t StartNs(const haptic::Settings& settings) {
     return kMeetingTicks * settings.period_ns();
@@ -60,6 +64,7 @@ class CoupledRun {
   protocol::HapticTick haptic_tick_;
   protocol::WorldFrame world_frame_;
   bool frame_is_new_ = false;
+  bool lapped_ = false;
 };
 
 }  // namespace rikiseki::lab

@@ -26,6 +26,7 @@ protocol::WorldFrame Frame(const std::vector<protocol::Plane>& planes,
   return frame;
 }
 
+const LocalBodies kNoCopies(kPeriodNs, 16, 0, PositionRule::kSecondOrder);
 const std::array<FingerState, 1> kFarFinger = {FingerState{Vec3(0, 10, 0), 0, 0}};
 
 bool SameBits(const Vec3& a, const Vec3& b) {
@@ -39,16 +40,16 @@ const Vec3 kNormal1 = Vec3(-0.2, 0.8, 0.5).normalized();
 
 TEST_CASE("interpolation shows prev at j = 0 and last at j = n, bit for bit, and stops there") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
-  track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger);
-  REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint0));
-  REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal0));
+  track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger, kNoCopies);
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.point, kPoint0));
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.normal, kNormal0));
   track.Advance(50);
-  track.Receive(Frame({PlaneAt(1, kPoint1, kNormal1)}), kFarFinger);
-  REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint0));
-  REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal0));
+  track.Receive(Frame({PlaneAt(1, kPoint1, kNormal1)}), kFarFinger, kNoCopies);
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.point, kPoint0));
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.normal, kNormal0));
   for (int j = 1; j < 50; ++j) {
     track.Advance(1);
-    const HalfSpace shown = track.Surfaces()[0].plane;
+    const HalfSpace shown = track.Surfaces(kNoCopies)[0].plane;
     REQUIRE((shown.point - (kPoint0 + j / 50.0 * (kPoint1 - kPoint0))).norm() < 1e-15);
     REQUIRE(shown.normal.norm() == Approx(1).epsilon(1e-15));
     const Vec3 blend = (1 - j / 50.0) * kNormal0 + j / 50.0 * kNormal1;
@@ -56,61 +57,61 @@ TEST_CASE("interpolation shows prev at j = 0 and last at j = n, bit for bit, and
   }
   for (int j = 50; j < 60; ++j) {
     track.Advance(1);
-    REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint1));
-    REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal1));
+    REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.point, kPoint1));
+    REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.normal, kNormal1));
   }
 }
 
 TEST_CASE("an early frame starts from what is displayed now") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
-  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
   track.Advance(50);
-  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
   track.Advance(20);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.4));
-  track.Receive(Frame({PlaneAt(1, Vec3(2, 0, 0), kNormal0)}, 10'000'000), kFarFinger);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.4));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.4));
+  track.Receive(Frame({PlaneAt(1, Vec3(2, 0, 0), kNormal0)}, 10'000'000), kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.4));
   track.Advance(5);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(1.2));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(1.2));
   track.Advance(3);  // two of them missed
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(1.68));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(1.68));
 }
 
 TEST_CASE("hold and extrapolate follow the newest frame") {
   FeatureTrack hold(DisplayRule::kHold, kPeriodNs);
   FeatureTrack extrapolate(DisplayRule::kExtrapolate, kPeriodNs);
   for (FeatureTrack* track : {&hold, &extrapolate}) {
-    track->Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger);
+    track->Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
     track->Advance(50);
-    track->Receive(Frame({PlaneAt(1, Vec3(0.1, 0, 0), kNormal0)}), kFarFinger);
-    REQUIRE(SameBits(track->Surfaces()[0].plane.point, Vec3(0.1, 0, 0)));
+    track->Receive(Frame({PlaneAt(1, Vec3(0.1, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
+    REQUIRE(SameBits(track->Surfaces(kNoCopies)[0].plane.point, Vec3(0.1, 0, 0)));
     track->Advance(25);
   }
-  REQUIRE(SameBits(hold.Surfaces()[0].plane.point, Vec3(0.1, 0, 0)));
-  REQUIRE(extrapolate.Surfaces()[0].plane.point.x() == Approx(0.15));
+  REQUIRE(SameBits(hold.Surfaces(kNoCopies)[0].plane.point, Vec3(0.1, 0, 0)));
+  REQUIRE(extrapolate.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.15));
   extrapolate.Advance(1000);
-  REQUIRE(extrapolate.Surfaces()[0].plane.point.x() == Approx(0.2));  // stops at n
+  REQUIRE(extrapolate.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.2));  // stops at n
 }
 
 TEST_CASE("a world faster than the haptic loop, and a fractional n") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
-  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}, 100'000), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}, 100'000), kFarFinger, kNoCopies);
   track.Advance(1);
-  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}, 2'500'000), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}, 2'500'000), kFarFinger, kNoCopies);
   track.Advance(2);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.8));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.8));
   track.Advance(1);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == 1);
 }
 
 TEST_CASE("opposite normals give a finite unit normal at every tick") {
   for (const DisplayRule rule : {DisplayRule::kInterpolate, DisplayRule::kExtrapolate}) {
     FeatureTrack track(rule, kPeriodNs);
-    track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger);
+    track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger, kNoCopies);
     track.Advance(50);
-    track.Receive(Frame({PlaneAt(1, kPoint0, -kNormal0)}), kFarFinger);
+    track.Receive(Frame({PlaneAt(1, kPoint0, -kNormal0)}), kFarFinger, kNoCopies);
     for (int j = 0; j <= 60; ++j) {
-      REQUIRE(track.Surfaces()[0].plane.normal.norm() == Approx(1).epsilon(1e-14));
+      REQUIRE(track.Surfaces(kNoCopies)[0].plane.normal.norm() == Approx(1).epsilon(1e-14));
       track.Advance(1);
     }
   }
@@ -119,30 +120,30 @@ TEST_CASE("opposite normals give a finite unit normal at every tick") {
 TEST_CASE("identity is body, generation, feature and pointer, not the place in the list") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
   track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0), PlaneAt(2, Vec3(2, 0, 0), kNormal0)}),
-                kFarFinger);
+                kFarFinger, kNoCopies);
   track.Advance(50);
   protocol::Plane reborn = PlaneAt(1, Vec3(5, 0, 0), kNormal0);
   reborn.generation = 2;
-  track.Receive(Frame({reborn, PlaneAt(2, Vec3(2.5, 0, 0), kNormal0)}), kFarFinger);
-  const auto shown = track.Surfaces();
+  track.Receive(Frame({reborn, PlaneAt(2, Vec3(2.5, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
+  const auto shown = track.Surfaces(kNoCopies);
   REQUIRE(shown.size() == 2);
   REQUIRE(shown[0].plane.point.x() == 5);  // a new one starts in its place
   REQUIRE(shown[1].plane.point.x() == 2);  // the old one from where it was
   REQUIRE(track.Has(3, 2, 0));
   REQUIRE(track.Has(3, 1, 0));  // feature 2 still is of generation 1
-  track.Receive(Frame({}), kFarFinger);
-  REQUIRE(track.Surfaces().empty());
+  track.Receive(Frame({}), kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).empty());
   REQUIRE_FALSE(track.Has(3, 1, 0));
 }
 
 TEST_CASE("planes of one identity pair in their order") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
   track.Receive(Frame({PlaneAt(0, Vec3(1, 0, 0), kNormal0), PlaneAt(0, Vec3(2, 0, 0), kNormal1)}),
-                kFarFinger);
+                kFarFinger, kNoCopies);
   track.Receive(Frame({PlaneAt(0, Vec3(3, 0, 0), kNormal0), PlaneAt(0, Vec3(4, 0, 0), kNormal1)}),
-                kFarFinger);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == 1);
-  REQUIRE(track.Surfaces()[1].plane.point.x() == 2);
+                kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.x() == 2);
 }
 
 TEST_CASE("a surface that appears above the finger rises to its place without a jump") {
@@ -150,20 +151,20 @@ TEST_CASE("a surface that appears above the finger rises to its place without a 
   const Vec3 up = Vec3::UnitY();
   // 8 mm deep with the radius; 1 mm of it was to be expected.
   const std::array<FingerState, 1> finger = {FingerState{Vec3(0, 0.002, 0), 0.01, 0.001}};
-  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger);
-  const auto depth = [&] { return track.Surfaces()[0].plane.point.y() + 0.01 - 0.002; };
+  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger, kNoCopies);
+  const auto depth = [&] { return track.Surfaces(kNoCopies)[0].plane.point.y() + 0.01 - 0.002; };
   REQUIRE(depth() == Approx(0.001));
   double before = depth();
   for (int k = 1; k <= 100; ++k) {
-    if (k == 30) track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger);
+    if (k == 30) track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger, kNoCopies);
     track.Advance(1);
     REQUIRE(depth() > before);
     REQUIRE(depth() - before < 0.007 / 100 * 1.001);
     before = depth();
   }
   REQUIRE(depth() == Approx(0.008));
-  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up), PlaneAt(2, Vec3(0, -0.0071, 0), up)}), finger);
-  REQUIRE(track.Surfaces()[1].plane.point.y() == -0.0071);  // 0.9 mm deep: a normal approach
+  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up), PlaneAt(2, Vec3(0, -0.0071, 0), up)}), finger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.y() == -0.0071);  // 0.9 mm deep: a normal approach
 }
 
 TEST_CASE("damaged planes and planes of other pointers are left out") {
@@ -184,14 +185,14 @@ TEST_CASE("damaged planes and planes of other pointers are left out") {
   planes.back().pointer = 1;
   planes.push_back(PlaneAt(7, kPoint0, 3 * kNormal0));  // long, but a direction
   planes.push_back(PlaneAt(8, Vec3(1e-310, 0, 0), kNormal0));
-  track.Receive(Frame(planes), kFarFinger);
-  REQUIRE(track.Surfaces().size() == 2);
-  REQUIRE((track.Surfaces()[0].plane.normal - kNormal0).norm() < 1e-15);
-  REQUIRE(track.Surfaces()[1].plane.point.x() == 0);  // no denormals inside the loop
+  track.Receive(Frame(planes), kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 2);
+  REQUIRE((track.Surfaces(kNoCopies)[0].plane.normal - kNormal0).norm() < 1e-15);
+  REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.x() == 0);  // no denormals inside the loop
   protocol::WorldFrame lying = Frame({});
   lying.plane_count = 4'000'000'000U;
-  track.Receive(lying, kFarFinger);
-  REQUIRE(track.Surfaces().size() <= protocol::kMaxPlanes);
+  track.Receive(lying, kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() <= protocol::kMaxPlanes);
 }
 
 }  // namespace
