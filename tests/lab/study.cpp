@@ -33,10 +33,13 @@ int SignificantDigits(const std::string& text) {
 }
 
 // A reference that diverged (inf, nan) is met by a run that diverged.
-bool Agrees(const ResultColumn& result, const std::string& expected_text, double got) {
+bool Agrees(const Case& study, const Row& row, std::size_t result, const std::string& expected_text,
+            double got) {
   const double expected = ParseNumber(expected_text);
   if (!std::isfinite(expected)) return !std::isfinite(got);
-  return std::abs(got - expected) <= result.tolerance + RoundingOf(expected_text);
+  const double tolerance =
+      study.tolerance ? study.tolerance(row, result, expected) : study.results[result].tolerance;
+  return std::abs(got - expected) <= tolerance + RoundingOf(expected_text);
 }
 
 void Compare(const Case& study, const Row& row, Outcome& outcome) {
@@ -46,7 +49,7 @@ void Compare(const Case& study, const Row& row, Outcome& outcome) {
     const auto expected = row.Find(column);
     if (!expected) continue;
     try {
-      if (!Agrees(study.results[i], *expected, outcome.values.at(i))) {
+      if (!Agrees(study, row, i, *expected, outcome.values.at(i))) {
         outcome.status = RowStatus::kMissed;
       }
     } catch (const std::invalid_argument&) {

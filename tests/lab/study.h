@@ -47,9 +47,19 @@ struct Case {
   /// ConfigError where the row makes no sense. Never returns kMissed: the study compares.
   std::function<Outcome(const Row& row, std::uint64_t seed)> run;
 
+  /// How far result number `result` may lie from what the row expects, where that is not the
+  /// column's tolerance but depends on the row. May be absent.
+  std::function<double(const Row& row, std::size_t result, double expected)> tolerance;
+
   /// Prints what the rows say together.
   std::function<void(const Table& rows, const std::vector<Outcome>& outcomes, std::ostream& out)>
       summarise;
+
+  /// Holds the rows of the case's own grid against each other: names every bar that is missed and
+  /// returns how many are. May be absent.
+  std::function<std::size_t(const Table& rows, const std::vector<Outcome>& outcomes,
+                            std::ostream& out)>
+      judge;
 };
 
 struct StudyOptions {

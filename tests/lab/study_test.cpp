@@ -63,6 +63,19 @@ TEST_CASE("the tolerance is absolute, beside the rounding of the written referen
   CHECK(Run("a,square\n1.5,2.250000002\n").find(",missed") != std::string::npos);
 }
 
+TEST_CASE("a tolerance may depend on the row") {
+  Case study = Squares();
+  study.tolerance = [](const Row& row, std::size_t result, double expected) {
+    CHECK(result == 0);
+    return row.Number("percent", 0, 100) / 100 * expected;
+  };
+  const StudyResult result =
+      RunStudy(study, Parse("a,square,percent\n10,99,1\n10,99,2\n10,200,50\n"), {});
+  CHECK(result.outcomes[0].status == RowStatus::kMissed);
+  CHECK(result.outcomes[1].status == RowStatus::kOk);
+  CHECK(result.outcomes[2].status == RowStatus::kOk);
+}
+
 TEST_CASE("the rounding of a written number is half a unit of its ninth digit or its last") {
   CHECK(RoundingOf("0.676327474") == Approx(5e-10));
   CHECK(RoundingOf("1.10288511") == Approx(5e-9));
