@@ -93,6 +93,8 @@ constexpr std::uint32_t kFriction =
     Measure<Plane>([](auto& a, auto& m) { PlaneFrictionFields(a, m); });
 constexpr std::uint32_t kRecovery =
     Measure<Plane>([](auto& a, auto& m) { PlaneRecoveryFields(a, m); });
+constexpr std::uint32_t kMobility =
+    Measure<Plane>([](auto& a, auto& m) { PlaneMobilityFields(a, m); });
 constexpr std::uint32_t kLocalHead =
     Measure<WorldFrame>([](auto& a, auto& m) { LocalHeadFields(a, m); });
 constexpr std::uint32_t kLocalBody =
@@ -118,7 +120,8 @@ constexpr std::uint32_t kBody = Measure<Body>([](auto& a, auto& m) { BodyFields(
 static_assert(kHapticTickBytes == kTickHead + kMaxPointers * (kPointer + kRotation) +
                                       kMaxChannels * kChannel + kGround);
 static_assert(kWorldFrameBytes ==
-              kFrameHead + kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery) +
+              kFrameHead +
+                  kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery + kMobility) +
                   kLocalHead + kMaxLocalBodies * (kLocalBody + kMaxContactPlanes * kContactPlane));
 static_assert(kHapticHealthBytes == kHapticHealth + kReconciliation);
 static_assert(WorldSceneBytes(3, 5, 7) ==
@@ -129,10 +132,10 @@ static_assert(WorldBodiesBytes(3) == kBodiesHead + 3 * kBody);
 static_assert(kTickHead % 8 == 0 && kPointer % 8 == 0 && kRotation % 8 == 0 && kChannel % 8 == 0 &&
               kGround % 8 == 0 && kFrameHead % 8 == 0 && kPlane % 8 == 0 && kSurface % 8 == 0 &&
               kBodiesHead % 8 == 0 && kBody % 8 == 0 && kVelocity % 8 == 0 && kFriction % 8 == 0 &&
-              kRecovery % 8 == 0 && kLocalHead % 8 == 0 && kLocalBody % 8 == 0 &&
-              kContactPlane % 8 == 0 && kHapticHealth % 8 == 0 && kReconciliation % 8 == 0 &&
-              kSceneHead % 8 == 0 && kSceneBody % 8 == 0 && kSceneCollider % 8 == 0 &&
-              kSceneMesh % 8 == 0);
+              kRecovery % 8 == 0 && kMobility % 8 == 0 && kLocalHead % 8 == 0 &&
+              kLocalBody % 8 == 0 && kContactPlane % 8 == 0 && kHapticHealth % 8 == 0 &&
+              kReconciliation % 8 == 0 && kSceneHead % 8 == 0 && kSceneBody % 8 == 0 &&
+              kSceneCollider % 8 == 0 && kSceneMesh % 8 == 0);
 
 // Encode copies contact planes in one piece, since the largest frame has 64 of them.
 static_assert(sizeof(ContactPlane) == kContactPlane && offsetof(ContactPlane, point) == 8 &&
@@ -140,7 +143,7 @@ static_assert(sizeof(ContactPlane) == kContactPlane && offsetof(ContactPlane, po
               offsetof(ContactPlane, friction) == 64 &&
               offsetof(ContactPlane, other_velocity) == 72 &&
               offsetof(ContactPlane, other_inverse_mass) == 96 &&
-              offsetof(ContactPlane, impulse) == 104);
+              offsetof(ContactPlane, impulse) == 104 && offsetof(ContactPlane, radius) == 128);
 
 std::uint32_t TickBytes(std::uint32_t pointers, std::uint32_t channels, std::uint32_t blocks) {
   return kTickHead + pointers * kPointer + channels * kChannel +
@@ -154,10 +157,11 @@ std::uint32_t FrameBytes(std::uint32_t planes, std::uint32_t blocks) {
          ((blocks & kFrameVelocities) != 0 ? planes * kVelocity : 0) +
          ((blocks & kFrameFriction) != 0 ? planes * kFriction : 0) +
          ((blocks & kFrameRecovery) != 0 ? planes * kRecovery : 0) +
+         ((blocks & kFrameMobility) != 0 ? planes * kMobility : 0) +
          ((blocks & kFrameLocalBodies) != 0 ? kLocalHead : 0);
 }
-constexpr std::uint32_t kFrameBlocks =
-    kFrameSurfaces | kFrameVelocities | kFrameFriction | kFrameRecovery | kFrameLocalBodies;
+constexpr std::uint32_t kFrameBlocks = kFrameSurfaces | kFrameVelocities | kFrameFriction |
+                                       kFrameRecovery | kFrameLocalBodies | kFrameMobility;
 
 /// Both the copy and the message, as it says of itself, reach this far.
 bool Reaches(std::span<const std::uint64_t> words, Encoded encoded, std::uint64_t bytes) {
@@ -281,6 +285,7 @@ DecodeStatus DecodeLocalBodies(Decoder& decoder, std::span<const std::uint64_t> 
     if (p.velocity != Vector{}) blocks |= kFrameVelocities;
     if (p.static_friction != 0 || p.dynamic_friction != 0) blocks |= kFrameFriction;
     if (p.recovery_s != 0) blocks |= kFrameRecovery;
+    if (p.inverse_mass != kMobilityNotSaid) blocks |= kFrameMobility;
   }
   std::uint32_t bytes = FrameBytes(m.plane_count, blocks);
   for (const LocalBody& b : local_bodies) {
@@ -298,6 +303,9 @@ DecodeStatus DecodeLocalBodies(Decoder& decoder, std::span<const std::uint64_t> 
     for (const LocalBody& b : local_bodies) {
       encoder.Whole(std::span<const ContactPlane>(b.contacts).first(b.contact_count));
     }
+  }
+  if ((blocks & kFrameMobility) != 0) {
+    for (const Plane& p : planes) PlaneMobilityFields(encoder, p);
   }
   return {bytes, blocks};
 }
@@ -319,6 +327,9 @@ DecodeStatus Decode(std::span<const std::uint64_t> words, Encoded encoded,
   if ((encoded.blocks & kFrameLocalBodies) != 0) {
     const auto status = DecodeLocalBodies(decoder, words, encoded, m, bytes);
     if (status != DecodeStatus::kOk) return status;
+  }
+  if ((encoded.blocks & kFrameMobility) != 0) {
+    for (Plane& p : planes) PlaneMobilityFields(decoder, p);
   }
   if (!LengthAgrees(words, encoded, bytes, kFrameBlocks)) return DecodeStatus::kLength;
   const DecodeStatus status = Validate(m);

@@ -108,6 +108,11 @@ constexpr void PlaneRecoveryFields(Archive& archive, P& p) {
   archive("recovery_s", p.recovery_s);
 }
 
+template <typename Archive, typename P>
+constexpr void PlaneMobilityFields(Archive& archive, P& p) {
+  archive("inverse_mass", p.inverse_mass);
+}
+
 template <typename Archive, typename Message>
 constexpr void LocalHeadFields(Archive& archive, Message& m) {
   archive("local_body_count", m.local_body_count);
@@ -142,6 +147,7 @@ constexpr void ContactPlaneFields(Archive& archive, C& c) {
   archive("other_velocity", c.other_velocity);
   archive("other_inverse_mass", c.other_inverse_mass);
   archive("impulse", c.impulse);
+  archive("radius", c.radius);
 }
 
 template <typename Archive, typename S>

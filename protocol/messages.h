@@ -38,8 +38,14 @@ enum class StreamType : std::uint32_t {
 
 /// How often a stream's payload has grown since its first version. SPEC.md 3.2, 8.1.
 constexpr std::uint16_t TypeVersion(StreamType type) {
-  const bool grew = type == StreamType::kWorldFrame || type == StreamType::kHapticHealth;
-  return grew ? 2 : 1;
+  switch (type) {
+    case StreamType::kWorldFrame:
+      return 3;
+    case StreamType::kHapticHealth:
+      return 2;
+    default:
+      return 1;
+  }
 }
 
 /// Why the displayed force is what it is. The numbers are wire format: append only.
@@ -124,6 +130,9 @@ struct HapticTick {
 // ---------------------------------------------------------------------------------------------------
 // world.frame
 
+/// A world that does not say whether a body can move.
+inline constexpr double kMobilityNotSaid = -1;
+
 /// A contact plane of one pointer: the tangent plane at a body's nearest point, normal towards the
 /// finger.
 struct Plane {
@@ -139,6 +148,8 @@ struct Plane {
   double static_friction = 0;   // of the finger on this surface, Coulomb
   double dynamic_friction = 0;  // likewise; 0 = none
   double recovery_s = 0;  // how long its force takes to come and go; 0 = the haptic side's own
+  double inverse_mass = kMobilityNotSaid;  // 1/kg, how the body yields there along the normal; 0 =
+                                           // it cannot move
 };
 
 /// Where a local body touches, or may touch before the next frame, something else than the finger.
@@ -147,11 +158,14 @@ struct ContactPlane {
   std::uint32_t other_generation = 0;
   Vector point{};           // m, of the local body, in its frame B
   Vector normal{};          // unit, in W, out of the other body
-  double gap = 0;           // m, along the normal at the pose of this frame; < 0 = penetration
+  double gap = 0;           // m, along the normal at the pose of this frame, beyond the depth at
+                            // which the world lets bodies rest; < 0 = penetration
   double friction = 0;      // Coulomb, of the pair
   Vector other_velocity{};  // m/s, of the other body at the point
   double other_inverse_mass = 0;  // 1/kg, how the other body yields there; 0 = it does not
   Vector impulse{};  // N s, in W, on the local body in the last substep: warms the solver up
+  double radius =
+      0;  // m: `point` is the centre of a rounding, contact is at point - radius * normal
 };
 
 /// A body that the haptic side moves by itself between two frames. design decision 3, `local`.
@@ -355,8 +369,8 @@ struct WorldScene {
   std::vector<SceneMesh> meshes;         // of each collider of shape kMesh, in their order
 };
 
-static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 128);
-static_assert(sizeof(ContactPlane) == 128 && sizeof(LocalBody) == 224 + 16 * 128);
+static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 136);
+static_assert(sizeof(ContactPlane) == 136 && sizeof(LocalBody) == 224 + 16 * 136);
 static_assert(sizeof(Body) == 120 && sizeof(SceneCollider) == 120 && sizeof(SceneBody) == 80 &&
               sizeof(SceneMesh) == 256);
 static_assert(std::is_trivially_copyable_v<HapticTick> && std::is_trivially_copyable_v<WorldFrame>);

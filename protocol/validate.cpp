@@ -133,10 +133,11 @@ DecodeStatus Validate(HapticTick& m) noexcept {
 namespace {
 
 DecodeStatus Validate(ContactPlane& c) {
-  if (!AllFinite(c.point, c.gap, c.friction, c.other_velocity, c.other_inverse_mass, c.impulse)) {
+  if (!AllFinite(c.point, c.gap, c.friction, c.other_velocity, c.other_inverse_mass, c.impulse,
+                 c.radius)) {
     return DecodeStatus::kNotFinite;
   }
-  if (c.friction < 0 || c.other_inverse_mass < 0) return DecodeStatus::kRange;
+  if (c.friction < 0 || c.other_inverse_mass < 0 || c.radius < 0) return DecodeStatus::kRange;
   return Normalise(c.normal);
 }
 
@@ -179,11 +180,12 @@ DecodeStatus Validate(WorldFrame& m) noexcept {
     Plane& p = m.planes[i];
     if (p.pointer >= kMaxPointers) return DecodeStatus::kIdentity;
     if (!AllFinite(p.point, p.stiffness, p.damping, p.velocity, p.static_friction,
-                   p.dynamic_friction, p.recovery_s)) {
+                   p.dynamic_friction, p.recovery_s, p.inverse_mass)) {
       return DecodeStatus::kNotFinite;
     }
     if (p.stiffness < 0 || p.damping < 0 || p.static_friction < 0 || p.dynamic_friction < 0 ||
-        p.recovery_s < 0 || p.recovery_s > kLongestRecovery) {
+        p.recovery_s < 0 || p.recovery_s > kLongestRecovery ||
+        (p.inverse_mass < 0 && p.inverse_mass != kMobilityNotSaid)) {
       return DecodeStatus::kRange;
     }
     if (const auto status = Normalise(p.normal); status != DecodeStatus::kOk) return status;

@@ -8,9 +8,9 @@
 namespace rikiseki::protocol {
 
 inline constexpr std::uint16_t kVersionMajor = 0;
-inline constexpr std::uint16_t kVersionMinor = 2;
+inline constexpr std::uint16_t kVersionMinor = 3;
 
 /// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
-inline constexpr std::uint64_t kLayoutHash = 0xE6EFB47136B26316ULL;
+inline constexpr std::uint64_t kLayoutHash = 0x60453468F9F4924FULL;
 
 }  // namespace rikiseki::protocol

@@ -9,9 +9,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include "common/body_step.h"
 #include "world_server/physics/box_plane_contact.h"
+#include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_shapes.h"
+#include "world_server/physics/contact_sites.h"
 
 namespace rikiseki::world {
 namespace {
@@ -32,17 +35,14 @@ PrincipalInertia Diagonalize(const Mat3& inertia) {
   return {.moments = solver.eigenvalues(), .orientation = Quat(axes).normalized()};
 }
 
-bool Isotropic(const Vec3& moments) {
-  return moments.maxCoeff() - moments.minCoeff() <= 1e-12 * moments.maxCoeff();
-}
-
 }  // namespace
 
 struct BulletWorld::Engine {
+  static constexpr std::size_t kFixed = static_cast<std::size_t>(-1);
+
   struct Body {
-    btRigidBody* rigid = nullptr;  // null for fixed bodies
-    double mass = 0;
-    PrincipalInertia inertia;
+    std::size_t moving = kFixed;   // its place in `moving`
+    Quat q_BP = Quat::Identity();  // principal axes in the body's frame
   };
 
   // Members are destroyed from the last to the first: the world before what it points to.
@@ -55,6 +55,8 @@ struct BulletWorld::Engine {
   std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;
   btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
   std::vector<Body> bodies;  // in the scene's order
+  std::vector<HookedBody> moving;
+  double resting_depth = 0;  // m, how deep bodies rest in each other
 
   explicit Engine(const Scene& scene);
   ~Engine() {
@@ -67,7 +69,9 @@ struct BulletWorld::Engine {
                    const Pose& pose);
   void Apply(const Kick& kick);
   void Substep(double step_s);
-  Pose BodyPose(const Body& body) const;
+  BodyState State(const Body& body) const;
+  void AddImpulses(std::size_t body, std::span<const BodyState> states,
+                   std::span<ContactSite> sites);
 };
 
 BulletWorld::Engine::Engine(const Scene& scene) {
@@ -84,9 +88,10 @@ BulletWorld::Engine::Engine(const Scene& scene) {
   info.m_numIterations = 50;
   info.m_leastSquaresResidualThreshold = 0;  // always all iterations: no early end, same bits
   info.m_splitImpulse = 1;                   // penetration is mended without giving velocity
-  info.m_splitImpulsePenetrationThreshold = -1e-4;
-  info.m_erp2 = 0.2;
-  info.m_linearSlop = 1e-4 * smallest;  // bodies rest this deep
+  info.m_splitImpulsePenetrationThreshold = -kDeepPenetration;
+  info.m_erp2 = kPenetrationRecovery;
+  resting_depth = 1e-4 * smallest;
+  info.m_linearSlop = resting_depth;
   // With two directions friction is a box in velocity space, 20 % and 45 degrees wrong at any step;
   // with one, Bullet takes the direction of slip.
   info.m_solverMode &= ~SOLVER_USE_2_FRICTION_DIRECTIONS;
@@ -142,8 +147,11 @@ void BulletWorld::Engine::AddMoving(const SceneBody& body) {
   rigid->setSleepingThresholds(1e-5, 1e-4);
   rigid->setCcdMotionThreshold(inner / 2);
   rigid->setCcdSweptSphereRadius(inner / 2);
-  if (Isotropic(inertia.moments)) rigid->setFlags(0);  // no gyroscopic torque to compute
-  bodies.push_back({.rigid = rigid, .mass = body.mass_kg, .inertia = inertia});
+  rigid->setFlags(0);  // the hook turns the body, gyroscopic torque included
+  rigid->setUserIndex(static_cast<int>(moving.size()));
+  bodies.push_back({.moving = moving.size(), .q_BP = inertia.orientation});
+  moving.push_back({.rigid = rigid,
+                    .inertia = BodyInertia::Of(body.mass_kg, Mat3(inertia.moments.asDiagonal()))});
 }
 
 btRigidBody* BulletWorld::Engine::Add(double mass, const Vec3& moments, btCollisionShape* shape,
@@ -152,43 +160,89 @@ btRigidBody* BulletWorld::Engine::Add(double mass, const Vec3& moments, btCollis
   info.m_friction = std::sqrt(friction);  // Bullet multiplies the two
   info.m_startWorldTransform = ToBullet(pose);
   rigid_bodies.push_back(std::make_unique<btRigidBody>(info));
-  world.addRigidBody(rigid_bodies.back().get());
-  return rigid_bodies.back().get();
+  btRigidBody* rigid = rigid_bodies.back().get();
+  rigid->setUserIndex(-1);                                // its place among the moving ones
+  rigid->setUserIndex2(static_cast<int>(bodies.size()));  // ... and in the scene
+  world.addRigidBody(rigid);
+  return rigid;
 }
 
 // Exactly J/m and R I^-1 R^T L, between substeps. Never as a force: Bullet's friction rows do not
 // see the torque of forces.
 void BulletWorld::Engine::Apply(const Kick& kick) {
   const Body& body = bodies[kick.body];
-  if (body.rigid == nullptr) return;
+  if (body.moving == kFixed) return;
   if (kick.impulse.isZero(0) && kick.angular_impulse.isZero(0)) return;
-  const Quat q_WP = FromBullet(body.rigid->getWorldTransform().getRotation());
-  const Vec3 dv = kick.impulse / body.mass;
-  const Vec3 dw =
-      q_WP * (q_WP.conjugate() * kick.angular_impulse).cwiseQuotient(body.inertia.moments);
-  body.rigid->setLinearVelocity(body.rigid->getLinearVelocity() + ToBullet(dv));
-  body.rigid->setAngularVelocity(body.rigid->getAngularVelocity() + ToBullet(dw));
-  body.rigid->activate(true);
+  const HookedBody& hooked = moving[body.moving];
+  btRigidBody& rigid = *hooked.rigid;
+  BodyState state{.pose = {.orientation = FromBullet(rigid.getWorldTransform().getRotation())},
+                  .velocity = FromBullet(rigid.getLinearVelocity()),
+                  .angular_velocity = FromBullet(rigid.getAngularVelocity())};
+  ApplyImpulse(hooked.inertia, kick.impulse, kick.angular_impulse, state);
+  rigid.setLinearVelocity(ToBullet(state.velocity));
+  rigid.setAngularVelocity(ToBullet(state.angular_velocity));
+  rigid.activate(true);
 }
 
-// The one place where the engine advances: corrections to Bullet's step belong before and after the
-// call.
+// The one place where the engine advances.
 void BulletWorld::Engine::Substep(double step_s) {
+  DropStaleContacts(world, step_s);
+  BeginSubstep(moving);
   world.stepSimulation(step_s, 0);
+  EndSubstep(world, moving, step_s);
 }
 
-Pose BulletWorld::Engine::BodyPose(const Body& body) const {
-  const btTransform& pose = body.rigid->getWorldTransform();
+BodyState BulletWorld::Engine::State(const Body& body) const {
+  const btRigidBody& rigid = *moving[body.moving].rigid;
+  const btTransform& pose = rigid.getWorldTransform();
   const Pose pose_WP{FromBullet(pose.getOrigin()), FromBullet(pose.getRotation()).normalized()};
-  return pose_WP * Pose{.orientation = body.inertia.orientation.conjugate()};
+  return {.pose = pose_WP * Pose{.orientation = body.q_BP.conjugate()},
+          .velocity = FromBullet(rigid.getLinearVelocity()),
+          .angular_velocity = FromBullet(rigid.getAngularVelocity())};
+}
+
+// Adds what the solver gave in the last substep, each impulse to the nearest site of the same pair
+// and direction.
+void BulletWorld::Engine::AddImpulses(std::size_t body, std::span<const BodyState> states,
+                                      std::span<ContactSite> sites) {
+  const btRigidBody* rigid = moving[bodies[body].moving].rigid;
+  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
+    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
+    const bool is_first = manifold.getBody0() == rigid;
+    if (!is_first && manifold.getBody1() != rigid) continue;
+    const btCollisionObject* other = is_first ? manifold.getBody1() : manifold.getBody0();
+    const auto other_body = static_cast<std::size_t>(other->getUserIndex2());
+    for (int j = 0; j < manifold.getNumContacts(); ++j) {
+      const btManifoldPoint& point = manifold.getContactPoint(j);
+      if (!(point.m_appliedImpulse > 0)) continue;
+      const double side = is_first ? 1 : -1;
+      const Vec3 normal = side * FromBullet(point.m_normalWorldOnB);
+      const Vec3 where =
+          FromBullet(is_first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
+      ContactSite* nearest = nullptr;
+      double nearest_distance = std::numeric_limits<double>::infinity();
+      for (ContactSite& site : sites) {
+        if (site.other != other_body || site.normal.dot(normal) < 0.9) continue;
+        const Vec3 place = states[body].pose * site.p_B - site.radius * site.normal;
+        const double distance = (place - where).norm();
+        if (distance >= nearest_distance) continue;
+        nearest = &site;
+        nearest_distance = distance;
+      }
+      if (nearest == nullptr) continue;
+      nearest->impulse +=
+          point.m_appliedImpulse * normal +
+          side * point.m_appliedImpulseLateral1 * FromBullet(point.m_lateralFrictionDir1);
+    }
+  }
 }
 
 BulletWorld::BulletWorld(const Scene& scene, double longest_substep_s)
-    : longest_substep_s_(longest_substep_s) {
+    : scene_(scene), longest_substep_s_(longest_substep_s) {
   if (!(longest_substep_s > 0)) throw std::invalid_argument("a substep must be longer than 0 s");
   bool moves = false;
   for (const SceneBody& body : scene.bodies) {
-    fixed_.push_back({.pose = body.pose_WB});
+    states_.push_back({.pose = body.pose_WB});
     moves = moves || !body.fixed;
   }
   if (moves) engine_ = std::make_unique<Engine>(scene);
@@ -197,7 +251,7 @@ BulletWorld::BulletWorld(const Scene& scene, double longest_substep_s)
 BulletWorld::~BulletWorld() = default;
 
 std::size_t BulletWorld::body_count() const {
-  return fixed_.size();
+  return states_.size();
 }
 
 bool BulletWorld::simulates() const {
@@ -205,20 +259,32 @@ bool BulletWorld::simulates() const {
 }
 
 BodyState BulletWorld::State(std::size_t body) const {
-  if (!engine_ || engine_->bodies[body].rigid == nullptr) return fixed_[body];
-  const Engine::Body& moving = engine_->bodies[body];
-  return {.pose = engine_->BodyPose(moving),
-          .velocity = FromBullet(moving.rigid->getLinearVelocity()),
-          .angular_velocity = FromBullet(moving.rigid->getAngularVelocity())};
+  return states_[body];
 }
 
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   if (!engine_) return;
   for (const Kick& kick : kicks) engine_->Apply(kick);
-  if (!(period_s > 0)) return;
-  // 50 ms of 1 ms is 50 substeps, whatever the last bit of the quotient says.
-  const double count = std::max(1.0, std::ceil(period_s / longest_substep_s_ - 1e-9));
-  for (double done = 0; done < count; ++done) engine_->Substep(period_s / count);
+  if (period_s > 0) {
+    // 50 ms of 1 ms is 50 substeps, whatever the last bit of the quotient says.
+    const double count = std::max(1.0, std::ceil(period_s / longest_substep_s_ - 1e-9));
+    for (double done = 0; done < count; ++done) engine_->Substep(period_s / count);
+  }
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    if (engine_->bodies[i].moving != Engine::kFixed)
+      states_[i] = engine_->State(engine_->bodies[i]);
+  }
+}
+
+bool BulletWorld::FindContacts(std::size_t body, double reach_m,
+                               std::vector<ContactSite>& sites) const {
+  if (!engine_ || scene_.bodies[body].fixed) return false;
+  const std::size_t first = sites.size();
+  if (!FindContactSites(scene_, states_, body, reach_m, sites)) return false;
+  const std::span<ContactSite> found = std::span(sites).subspan(first);
+  for (ContactSite& site : found) site.gap += engine_->resting_depth;
+  engine_->AddImpulses(body, states_, found);
+  return true;
 }
 
 }  // namespace rikiseki::world

@@ -4,8 +4,10 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "common/geometry.h"
+#include "common/rigid_body.h"
 
 namespace rikiseki::world {
 
@@ -16,10 +18,17 @@ struct Kick {
   Vec3 angular_impulse = Vec3::Zero();  // N m s, about the body's centre of mass, in W
 };
 
-struct BodyState {
-  Pose pose = {};                        // of the centre-of-mass frame, in W
-  Vec3 velocity = Vec3::Zero();          // m/s, of the centre of mass
-  Vec3 angular_velocity = Vec3::Zero();  // rad/s
+/// Where a body touches, or may soon touch, another: a point of the body and a plane of the other.
+struct ContactSite {
+  std::size_t other = 0;
+  Vec3 p_B = Vec3::Zero();             // m, in the body's frame; the centre of a rounding
+  double radius = 0;                   // m, of the rounding: contact is at p_B - radius * normal
+  Vec3 normal = Vec3::UnitZ();         // unit, in W, out of the other
+  double gap = 0;                      // m, beyond the depth at which the solver lets bodies rest
+  double friction = 0;                 // Coulomb, of the pair
+  Vec3 other_velocity = Vec3::Zero();  // m/s, of the other there
+  double other_inverse_mass = 0;       // 1/kg, how the other yields there along the normal
+  Vec3 impulse = Vec3::Zero();         // N s, in W, on the body in the last substep
 };
 
 class DynamicsWorld {
@@ -33,6 +42,11 @@ class DynamicsWorld {
   /// v += J/m and w += I^-1 L for every kick, then advances by `period_s` >= 0. Kicks of fixed bodies
   /// are ignored. The one place where impulses enter the dynamics.
   virtual void ApplyAndStep(std::span<const Kick> kicks, double period_s) = 0;
+
+  /// Every contact of a moving body whose gap is at most `reach_m`, appended to `sites`, deepest
+  /// first. False, and nothing, where that cannot be told: the body then has no local copy.
+  virtual bool FindContacts(std::size_t body, double reach_m,
+                            std::vector<ContactSite>& sites) const = 0;
 };
 
 }  // namespace rikiseki::world

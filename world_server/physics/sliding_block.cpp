@@ -6,11 +6,14 @@
 namespace rikiseki::world {
 
 SlidingBlock::SlidingBlock(const Scene& scene, double friction, SlideRule rule)
-    : deceleration_(friction * std::abs(scene.gravity.z())), rule_(rule) {
+    : friction_(friction), deceleration_(friction * std::abs(scene.gravity.z())), rule_(rule) {
   std::size_t moving = 0;
   for (const SceneBody& body : scene.bodies) {
     states_.push_back({.pose = body.pose_WB});
-    if (body.fixed) continue;
+    if (body.fixed) {
+      floor_ = states_.size() - 1;
+      continue;
+    }
     ++moving;
     block_ = states_.size() - 1;
     mass_kg_ = body.mass_kg;
@@ -49,6 +52,15 @@ void SlidingBlock::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
       displacement_ += period_s * velocity_;
       break;
   }
+}
+
+bool SlidingBlock::FindContacts(std::size_t body, double /*reach_m*/,
+                                std::vector<ContactSite>& sites) const {
+  if (body != block_) return false;
+  ContactSite& site = sites.emplace_back();
+  site.other = floor_;
+  site.friction = friction_;
+  return true;
 }
 
 }  // namespace rikiseki::world

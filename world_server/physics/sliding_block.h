@@ -28,9 +28,15 @@ class SlidingBlock final : public DynamicsWorld {
   BodyState State(std::size_t body) const override;
   void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
 
+  /// The floor, under the block's centre.
+  bool FindContacts(std::size_t body, double reach_m,
+                    std::vector<ContactSite>& sites) const override;
+
  private:
   std::vector<BodyState> states_;  // at the start
   std::size_t block_ = 0;
+  std::size_t floor_ = 0;  // a fixed body, if there is one
+  double friction_;
   double mass_kg_ = 0;
   double deceleration_ = 0;  // mu g, m/s^2
   SlideRule rule_;

@@ -1,0 +1,140 @@
+#include "world_server/physics/contact_sites.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/body_step.h"
+#include "world_server/features/nearest_point.h"
+#include "world_server/physics/box_box_contact.h"
+#include "world_server/physics/bullet_shapes.h"
+
+namespace rikiseki::world {
+namespace {
+
+// A place where two shapes are near, in W.
+struct Near {
+  Vec3 point = Vec3::Zero();  // of the body; the centre of its rounding
+  double radius = 0;
+  Vec3 normal = Vec3::UnitZ();  // out of the other
+  double gap = 0;
+};
+
+void SphereNear(const Sphere& sphere, const Pose& pose_WS, const Shape& other, const Pose& pose_WO,
+                std::vector<Near>& found) {
+  const Vec3 centre = pose_WS.position;
+  const NearestPoint nearest = FindNearestPoint(other, pose_WO.Inverse() * centre);
+  found.push_back({.point = centre,
+                   .radius = sphere.radius,
+                   .normal = pose_WO.orientation * nearest.normal,
+                   .gap = nearest.distance - sphere.radius});
+}
+
+void BoxNearSphere(const Box& box, const Pose& pose_WS, const Sphere& other, const Pose& pose_WO,
+                   std::vector<Near>& found) {
+  const NearestPoint nearest = FindNearestPoint(box, pose_WS.Inverse() * pose_WO.position);
+  found.push_back({.point = pose_WS * nearest.point,
+                   .normal = -(pose_WS.orientation * nearest.normal),
+                   .gap = nearest.distance - other.radius});
+}
+
+void BoxNearHalfSpace(const Box& box, const Pose& pose_WS, const HalfSpace& other,
+                      const Pose& pose_WO, std::vector<Near>& found) {
+  const Vec3 normal = pose_WO.orientation * other.normal;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 sign((corner & 1) != 0 ? 1 : -1, (corner & 2) != 0 ? 1 : -1,
+                    (corner & 4) != 0 ? 1 : -1);
+    const Vec3 point = pose_WS * Vec3(sign.cwiseProduct(box.half_extents));
+    found.push_back(
+        {.point = point, .normal = normal, .gap = normal.dot(point - pose_WO.position)});
+  }
+}
+
+// False where the pair of shapes is not covered.
+bool FindNear(const Shape& shape, const Pose& pose_WS, const Shape& other, const Pose& pose_WO,
+              double reach_m, std::vector<Near>& found) {
+  if (const auto* sphere = std::get_if<Sphere>(&shape)) {
+    SphereNear(*sphere, pose_WS, other, pose_WO, found);
+    return true;
+  }
+  const auto* box = std::get_if<Box>(&shape);
+  if (box == nullptr) return false;
+  if (const auto* sphere = std::get_if<Sphere>(&other)) {
+    BoxNearSphere(*box, pose_WS, *sphere, pose_WO, found);
+  } else if (const auto* half_space = std::get_if<HalfSpace>(&other)) {
+    BoxNearHalfSpace(*box, pose_WS, *half_space, pose_WO, found);
+  } else if (const auto* other_box = std::get_if<Box>(&other)) {
+    for (const BoxBoxPoint& point :
+         FindBoxBoxContact(*box, pose_WS, *other_box, pose_WO, reach_m)) {
+      found.push_back({.point = point.point_W, .normal = point.normal_W, .gap = point.gap});
+    }
+  } else {
+    return false;
+  }
+  return true;
+}
+
+double Outer(const Collider& collider) {
+  return std::holds_alternative<HalfSpace>(collider.shape) ? 0 : OuterRadius(collider.shape);
+}
+
+// A lower bound of the distance between two shapes.
+bool MayReach(const Collider& a, const Pose& pose_WA, const Collider& b, const Pose& pose_WB,
+              double reach_m) {
+  if (const auto* plane = std::get_if<HalfSpace>(&b.shape)) {
+    const Vec3 normal = pose_WB.orientation * plane->normal;
+    return normal.dot(pose_WA.position - pose_WB.position) <= Outer(a) + reach_m;
+  }
+  return (pose_WA.position - pose_WB.position).norm() <= Outer(a) + Outer(b) + reach_m;
+}
+
+}  // namespace
+
+bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std::size_t body,
+                      double reach_m, std::vector<ContactSite>& sites) {
+  const std::size_t first = sites.size();
+  const BodyState& state = states[body];
+  const Pose pose_BW = state.pose.Inverse();
+  std::vector<Near> found;
+  for (const Collider& collider : scene.bodies[body].colliders) {
+    const Pose pose_WS = state.pose * collider.pose_BS;
+    for (std::size_t other = 0; other < scene.bodies.size(); ++other) {
+      if (other == body) continue;
+      const SceneBody& other_body = scene.bodies[other];
+      for (const Collider& other_collider : other_body.colliders) {
+        const Pose pose_WO = states[other].pose * other_collider.pose_BS;
+        if (!MayReach(collider, pose_WS, other_collider, pose_WO, reach_m)) continue;
+        found.clear();
+        if (!FindNear(collider.shape, pose_WS, other_collider.shape, pose_WO, reach_m, found)) {
+          sites.resize(first);
+          return false;
+        }
+        for (const Near& near : found) {
+          if (!(near.gap <= reach_m)) continue;
+          ContactSite site;
+          site.other = other;
+          site.p_B = pose_BW * near.point;
+          site.radius = near.radius;
+          site.normal = near.normal;
+          site.gap = near.gap;
+          site.friction = std::sqrt(collider.friction * other_collider.friction);
+          if (!other_body.fixed) {
+            const Vec3 point = near.point - near.radius * near.normal;
+            site.other_velocity = states[other].VelocityAt(point);
+            site.other_inverse_mass =
+                InverseEffectiveMass(BodyInertia::Of(other_body.mass_kg, other_body.inertia),
+                                     states[other].pose, point, near.normal);
+          }
+          sites.push_back(site);
+        }
+      }
+    }
+  }
+  // Gaps that are equal to a nanometre stay in the order of the geometry, whatever their last bits.
+  std::stable_sort(sites.begin() + static_cast<std::ptrdiff_t>(first), sites.end(),
+                   [](const ContactSite& a, const ContactSite& b) {
+                     return std::floor(a.gap * 1e9) < std::floor(b.gap * 1e9);
+                   });
+  return true;
+}
+
+}  // namespace rikiseki::world
