@@ -10,15 +10,17 @@
 #include "common/exit_code.h"
 #include "common/version.h"
 #include "tests/lab/fig6.h"
+#include "tests/lab/planes.h"
 #include "tests/lab/pushes.h"
 #include "tests/lab/study.h"
+#include "tests/lab/wall.h"
 
 namespace rikiseki::lab {
 namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6(), Pushes()};
+  return {Fig6(), Planes(), Pushes(), Wall()};
 }
 
 struct Options {
@@ -31,7 +33,11 @@ struct Options {
 
 std::string CaseNames() {
   std::string names;
-  for (const Case& known : Cases()) names += (names.empty() ? "" : ", ") + known.name;
+  std::string last;
+  for (const Case& known : Cases()) {
+    if (known.name != last) names += (names.empty() ? "" : ", ") + known.name;
+    last = known.name;
+  }
   return names;
 }
 
@@ -102,9 +108,8 @@ Options Parse(int argc, char** argv) {
 int Run(int argc, char** argv) {
   const Options options = Parse(argc, argv);
   const std::vector<Case> cases = Cases();
-  const auto study = std::find_if(cases.begin(), cases.end(), [&](const Case& known) {
-    return known.name == options.case_name;
-  });
+  const auto named = [&](const Case& known) { return known.name == options.case_name; };
+  auto study = std::find_if(cases.begin(), cases.end(), named);
   if (study == cases.end()) {
     const std::string complaint =
         options.case_name.empty() ? "a case is required" : "there is no case " + options.case_name;
@@ -112,6 +117,12 @@ int Run(int argc, char** argv) {
   }
   const Table table =
       options.cases.empty() ? study->grid(options.quick) : Table::Load(options.cases);
+  study = std::find_if(study, cases.end(), [&](const Case& known) {
+    return named(known) && (!known.takes || known.takes(table));
+  });
+  if (study == cases.end()) {
+    throw ConfigError(table.name() + ": the columns are of no row format of " + options.case_name);
+  }
   // Tried before the work, which may be long; what the file holds is kept until there is something
   // new.
   if (!options.out.empty() && !std::ofstream(options.out, std::ios::app)) {

@@ -25,7 +25,7 @@ Outcome RunRow(const Row& row, std::uint64_t /*seed*/) {
            got.jump_max_m, got.yaw_rad}};
 }
 
-// An expected result is met as near as `local` must come to a single rate, whoever computed it.
+// An expected result is to be met as near as `local` must come to a single rate, whoever computed it.
 double Tolerance(const Row& row, std::size_t result, double expected) {
   const PushLoops loops = ParseLoops(row);
   const PushBars bars = BarsOf(ParsePush(row).script, loops.coupling ? loops.world_period_s : 0);
@@ -51,6 +51,14 @@ double Tolerance(const Row& row, std::size_t result, double expected) {
     default:
       return bars.yaw_rad;
   }
+}
+
+bool Agrees(const Row& row, const Outcome& outcome, std::size_t result) {
+  const double expected = ExpectedNumber(row, kPushResults[result]);
+  const double got = outcome.values[result];
+  if (!std::isfinite(expected)) return !std::isfinite(got);
+  return std::abs(got - expected) <=
+         Tolerance(row, result, expected) + RoundingOf(row.Text(kPushResults[result]));
 }
 
 struct Setup {
@@ -137,7 +145,7 @@ Case Pushes() {
   for (const char* name : kPushResults) study.results.push_back({name});
   study.grid = Grid;
   study.run = RunRow;
-  study.tolerance = Tolerance;
+  study.agrees = Agrees;
   study.summarise = SummarisePushes;
   study.judge = JudgePushes;
   return study;

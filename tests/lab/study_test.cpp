@@ -63,19 +63,6 @@ TEST_CASE("the tolerance is absolute, beside the rounding of the written referen
   CHECK(Run("a,square\n1.5,2.250000002\n").find(",missed") != std::string::npos);
 }
 
-TEST_CASE("a tolerance may depend on the row") {
-  Case study = Squares();
-  study.tolerance = [](const Row& row, std::size_t result, double expected) {
-    CHECK(result == 0);
-    return row.Number("percent", 0, 100) / 100 * expected;
-  };
-  const StudyResult result =
-      RunStudy(study, Parse("a,square,percent\n10,99,1\n10,99,2\n10,200,50\n"), {});
-  CHECK(result.outcomes[0].status == RowStatus::kMissed);
-  CHECK(result.outcomes[1].status == RowStatus::kOk);
-  CHECK(result.outcomes[2].status == RowStatus::kOk);
-}
-
 TEST_CASE("the rounding of a written number is half a unit of its ninth digit or its last") {
   CHECK(RoundingOf("0.676327474") == Approx(5e-10));
   CHECK(RoundingOf("1.10288511") == Approx(5e-9));
@@ -111,6 +98,28 @@ TEST_CASE("neither threads nor shards change a row") {
   std::string joined = "a,got_square,got_status\n";
   for (const std::string& row : rows) joined += row + "\n";
   CHECK(joined == whole);
+}
+
+TEST_CASE("a case may judge for itself, and give results that are no numbers") {
+  Case study = Squares();
+  study.results.push_back({.name = "parity"});
+  study.run = [](const Row& row, std::uint64_t) {
+    const int a = row.Integer("a", 0, 100);
+    return Outcome{.values = {1.0 * a * a}, .texts = {a % 2 == 0 ? "even" : "odd"}};
+  };
+  study.agrees = [](const Row& row, const Outcome& outcome, std::size_t index) {
+    return index == 0 ? ExpectedNumber(row, "square") <= outcome.values[0]
+                      : row.Text("parity") == outcome.texts[0];
+  };
+  const auto run = [&](const std::string& text) {
+    std::ostringstream out;
+    WriteStudy(study, RunStudy(study, Parse(text), {}), out);
+    return out.str();
+  };
+  CHECK(run("a,square,parity\n2,3,even\n2,5,even\n3,,even\n3,8,odd\n2,nan,\n") ==
+        "a,square,parity,got_square,got_parity,got_status\n2,3,even,4,even,ok\n"
+        "2,5,even,4,even,missed\n3,,even,9,odd,missed\n3,8,odd,9,odd,ok\n2,nan,,4,even,missed\n");
+  CHECK_THROWS_AS(run("a,square\n2,much\n"), ConfigError);
 }
 
 TEST_CASE("the seed reaches the case") {
