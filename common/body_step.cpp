@@ -270,6 +270,10 @@ void StepBodies(std::span<StepBody> bodies, std::span<StepContact> contacts, dou
   }
 }
 
+int SubstepCount(double time_s, double longest_s) noexcept {
+  return static_cast<int>(std::clamp(std::ceil(time_s / longest_s - 0.25), 1.0, 1e6));
+}
+
 double InverseEffectiveMass(const BodyInertia& inertia, const Pose& pose_WB, const Vec3& point_W,
                             const Vec3& direction) noexcept {
   const Mat3 inverse = inertia.InverseInertia(pose_WB.orientation);

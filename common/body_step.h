@@ -68,6 +68,10 @@ void SolveVelocities(std::span<StepBody> bodies, std::span<StepContact> contacts
 void StepBodies(std::span<StepBody> bodies, std::span<StepContact> contacts, double step_s,
                 PositionRule rule) noexcept;
 
+/// Into how many equal substeps a time is divided, none longer than `longest_s` - or than a quarter
+/// more, so that the tick of a jittery clock remains one step on both sides.
+int SubstepCount(double time_s, double longest_s) noexcept;
+
 /// 1/M_eff [1/kg] of a body at a point along a unit direction:
 /// 1/M + ((r x n)^T I^-1 (r x n)). numerics.md.
 double InverseEffectiveMass(const BodyInertia& inertia, const Pose& pose_WB, const Vec3& point_W,

@@ -41,6 +41,10 @@ ConfigSchema DaemonSchema(Settings& settings) {
                  {"hold", DisplayRule::kHold},
                  {"extrapolate", DisplayRule::kExtrapolate}},
                 "How surfaces move between two world frames.");
+  schema.Choice("render.position_rule", &render.position_rule,
+                {{"second_order", PositionRule::kSecondOrder},
+                 {"semi_implicit", PositionRule::kSemiImplicit}},
+                "How local copies of bodies advance; semi_implicit is for written experiments.");
   schema.Number("render.finger_radius_mm", &render.finger_radius_mm, 0, 100,
                 "Radius of the sphere that stands for the finger.");
 

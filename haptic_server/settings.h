@@ -7,6 +7,7 @@
 
 #include "common/config.h"
 #include "common/geometry.h"
+#include "common/rigid_body.h"
 
 namespace rikiseki::haptic {
 
@@ -29,6 +30,7 @@ struct RenderSettings {
   double damping_ns_per_m = 2;
   bool adhesion = false;  // true: the literal damper of the paper, which may pull
   DisplayRule display = DisplayRule::kInterpolate;
+  PositionRule position_rule = PositionRule::kSecondOrder;  // of the local copies
   double finger_radius_mm = 10;
 };
 

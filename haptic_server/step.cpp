@@ -10,6 +10,7 @@
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/ledger.h"
+#include "haptic_server/render/local_bodies.h"
 #include "haptic_server/render/surface_force.h"
 #include "haptic_server/safety/peer_watch.h"
 #include "haptic_server/safety/safety_stage.h"
@@ -29,6 +30,12 @@ constexpr std::uint64_t kLongestFrameNs = 10'000'000'000;
 std::uint64_t HistoryTicks(const Settings& settings) {
   const double world_period_s = settings.loop.longest_world_period_ms * 1e-3;
   return static_cast<std::uint64_t>(8 * world_period_s * settings.loop.rate_hz) + 4096;
+}
+
+// A frame that is four world periods old is of a world that is all but lost.
+std::uint64_t ReplayTicks(const Settings& settings) {
+  const double world_period_s = settings.loop.longest_world_period_ms * 1e-3;
+  return static_cast<std::uint64_t>(4 * world_period_s * settings.loop.rate_hz) + 64;
 }
 
 bool IsSound(const DeviceSample& sample) {
@@ -52,6 +59,7 @@ struct HapticStep::State {
         radius(checked.render.finger_radius_mm * 1e-3),
         device(used_device),
         track(checked.render.display, period_ns),
+        copies(period_ns, ReplayTicks(checked), own_epoch, checked.render.position_rule),
         surface_force(checked.render, Seconds(period_ns)),
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         peer(checked),
@@ -75,6 +83,7 @@ struct HapticStep::State {
   Device& device;
 
   FeatureTrack track;
+  LocalBodies copies;
   SurfaceForce surface_force;
   Ledger ledger;
   PeerWatch peer;
@@ -126,6 +135,7 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   if (tick > 0) track.Advance(elapsed_ticks);
   if (state == PeerState::kAbsent && shown_epoch != 0) {
     track.Clear();
+    copies.Clear();
     surface_force.Reset();
     penetration = 0;
     shown_epoch = shown_frame = 0;
@@ -139,29 +149,32 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
     // surprise.
     const double approach = speed * Seconds(period_ns) * static_cast<double>(1 + elapsed_ticks);
     const FingerState finger{sample.position, radius, penetration + approach + 1e-6};
-    track.Receive(*world.frame, std::span(&finger, 1));
+    copies.Receive(*world.frame, tick);
+    track.Receive(*world.frame, std::span(&finger, 1), copies);
     shown_epoch = world.epoch;
     shown_frame = world.frame->frame;
   }
 }
 
-// Contact solve and surface force at the last sound sample. Bodies without a channel are left out.
+// Contact solve and surface force at the last sound sample. Movable bodies without a channel are
+// left out.
 // // RT:
 std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
                                                      bool& no_channel) noexcept {
-  const std::span<const Surface> surfaces = track.Surfaces();
+  const std::span<const Surface> surfaces = track.Surfaces(copies);
   for (std::size_t i = 0; i < surfaces.size(); ++i) planes[i] = surfaces[i].plane;
   const ContactSolution contact =
       SolveContact(sample.position, radius, std::span(planes).first(surfaces.size()));
   penetration = contact.displacement.norm();
   std::size_t count = 0;
   for (const BodyShare& share : surface_force.Update(surfaces, contact, radius, elapsed_ticks)) {
-    if (ledger.Open(share.body, share.generation, kPointer, tick)) {
+    if (share.fixed || ledger.Open(share.body, share.generation, kPointer, tick)) {
       shares[count++] = share;
     } else {
       no_channel = true;
     }
   }
+  copies.SolveStiff(std::span(shares).first(count));
   return std::span(shares).first(count);
 }
 
@@ -208,6 +221,7 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   health.largest_force_step = std::max(health.largest_force_step, (force - displayed).norm());
   health.target = ToArray(sample.target);
   health.books = ledger.books();
+  health.reconciliation = copies.reconciliation();
 
   displayed = force;
   start_ns = time.start_ns;
@@ -261,6 +275,10 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world,
                      .displayed = displayed,
                      .wanted = shares,
                      .finger = state.sample.position});
+  state.copies.Step(state.tick, state.ledger.Booked(),
+                    state.tick == 0
+                        ? Seconds(state.period_ns)
+                        : Seconds(std::max<std::int64_t>(time.previous_duration_ns, 0)));
   state.ledger.CloseIdle(kPointer, state.tick, [&](std::uint32_t body, std::uint32_t generation) {
     return state.track.Has(body, generation, kPointer);
   });

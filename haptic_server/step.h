@@ -1,5 +1,5 @@
 // One tick of the haptic loop over plain state: device.read -> feature track -> contact solve ->
-// surface force -> safety -> device.write -> ledger -> (local bodies: issue 3) -> message. The
+// surface force -> safety -> device.write -> ledger -> local bodies -> message. The
 // clock, the device and the peer are passed in: the daemon drives it with real time, the laboratory
 // with virtual time.
 #pragma once

@@ -17,8 +17,12 @@ void Bind(ConfigSchema& schema, Settings& settings) {
       {{"position", protocol::Coupling::kPosition},
        {"impulse", protocol::Coupling::kImpulse},
        {"local", protocol::Coupling::kLocal}},
-      "how the finger moves bodies: by the penetration sampled at the "
-      "world tick, or by the integrated force");
+      "how the finger moves bodies: by the penetration sampled at the world tick, by the "
+      "integrated force, or by the force tick by tick, with copies of the bodies on the haptic "
+      "side");
+  schema.Choice<ReplayRule>("coupling.replay", &settings.coupling.replay,
+                            {{"ticks", ReplayRule::kTicks}, {"lump", ReplayRule::kLump}},
+                            "how `local` brings the force into the world; lump is for study only");
   schema.Number("coupling.force_cap_n", &settings.coupling.force_cap_n, 0.01, 1e6,
                 "one world tick applies at most this force times the gap, the rest is discarded");
   schema.Number("coupling.gap_ms", &settings.coupling.gap_ms, 0, 60000,
@@ -44,10 +48,6 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
   Bind(schema, settings);
   schema.Load(path);
   for (const std::string& assignment : set) schema.Set(assignment);
-  if (settings.coupling.coupling == protocol::Coupling::kLocal) {
-    schema.Refuse("coupling.coupling",
-                  "this version has no local dynamics; position and impulse exist");
-  }
   if (settings.scene.file.empty()) {
     schema.Refuse("scene.file", "the path of an SDFormat world is expected");
   }

@@ -22,10 +22,17 @@ struct PhysicsSettings {
   double substep_ms = 1;
 };
 
+/// How `local` brings the push into the world.
+enum class ReplayRule {
+  kTicks,  // tick by tick, as it was displayed
+  kLump,   // one kick per world tick: the naive way, unstable; for study only
+};
+
 struct CouplingSettings {
   protocol::Coupling coupling = protocol::Coupling::kImpulse;
   double force_cap_n = 20;  // bounds what is applied after a gap: at most force_cap * gap
-  double gap_ms = 0;        // 0 = max(100 ms, 3 periods)
+  ReplayRule replay = ReplayRule::kTicks;
+  double gap_ms = 0;  // 0 = max(100 ms, 3 periods)
 };
 
 struct FeatureSettings {

@@ -6,6 +6,8 @@
 
 #include "world_server/coupling/kick.h"
 #include "world_server/coupling/ledger_reader.h"
+#include "world_server/coupling/replay.h"
+#include "world_server/features/local_bodies.h"
 #include "world_server/features/planes.h"
 
 namespace rikiseki::world {
@@ -34,7 +36,8 @@ struct WorldStep::State {
 
   void Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics);
   void ReadStates();
-  std::vector<Kick> Kicks(double period_s);
+  void Advance(double period_s);
+  void Penalise(double period_s);
 };
 
 void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics) {
@@ -75,24 +78,40 @@ void WorldStep::State::ReadStates() {
   }
 }
 
-std::vector<Kick> WorldStep::State::Kicks(double period_s) {
+// `position`: a finger that has not been heard of for a gap pushes no longer.
+void WorldStep::State::Penalise(double period_s) {
+  std::vector<Kick> kicks;
+  const double gap_s = settings.gap_s();
+  if (silence_ns <= std::llround(gap_s * 1e9)) {
+    kicks = PenaltyKicks(scene, states, fingers,
+                         {.stiffness_n_per_m = stiffness_n_per_m,
+                          .period_s = period_s,
+                          .largest_impulse_ns = settings.coupling.force_cap_n * gap_s});
+  }
+  Vec3 penalty = ToVec3(health.penalty_impulse);
+  for (const Kick& kick : kicks) penalty += kick.impulse;
+  health.penalty_impulse = ToArray(penalty);
+  dynamics->ApplyAndStep(kicks, period_s);
+}
+
+// Coupling and physics.
+void WorldStep::State::Advance(double period_s) {
   const std::span<const PendingImpulse> owed = ledger.Take();
-  if (settings.coupling.coupling == protocol::Coupling::kImpulse) return ImpulseKicks(owed, states);
-  // A finger that has not been heard of for a gap pushes no longer.
-  if (silence_ns > std::llround(settings.gap_s() * 1e9)) return {};
-  return PenaltyKicks(scene, states, fingers,
-                      {.stiffness_n_per_m = stiffness_n_per_m,
-                       .period_s = period_s,
-                       .largest_impulse_ns = settings.coupling.force_cap_n * settings.gap_s()});
+  if (settings.coupling.coupling == protocol::Coupling::kPosition) {
+    Penalise(period_s);
+  } else if (settings.coupling.coupling == protocol::Coupling::kLocal &&
+             settings.coupling.replay == ReplayRule::kTicks) {
+    ReplayPush(ledger.replay(), period_s, settings.coupling.force_cap_n * settings.gap_s(),
+               *dynamics);
+  } else {
+    dynamics->ApplyAndStep(ImpulseKicks(owed, states), period_s);
+  }
+  ReadStates();
 }
 
 WorldStep::WorldStep(const Settings& settings, const Scene& scene,
                      std::unique_ptr<DynamicsWorld> dynamics, std::uint64_t own_epoch)
     : state_(std::make_unique<State>(settings, own_epoch)) {
-  if (settings.coupling.coupling != protocol::Coupling::kPosition &&
-      settings.coupling.coupling != protocol::Coupling::kImpulse) {
-    throw std::invalid_argument("coupling.coupling: position and impulse exist");
-  }
   state_->Adopt(scene, std::move(dynamics));
 }
 
@@ -113,12 +132,10 @@ void WorldStep::Consume(const protocol::HapticTick& tick) {
 
 void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   State& s = *state_;
-  const std::vector<Kick> kicks = s.Kicks(period_s);
-  s.dynamics->ApplyAndStep(kicks, period_s);
+  s.Advance(period_s);
   const std::int64_t period_ns = std::llround(period_s * 1e9);
   s.silence_ns += period_ns;
   s.world_time_ns += period_ns;
-  s.ReadStates();
 
   frame = {};
   frame.frame = ++s.frame;
@@ -130,19 +147,20 @@ void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   frame.applied = s.ledger.epoch_books().applied;
   frame.discarded = s.ledger.epoch_books().TotalDiscarded();
   frame.coupling = s.settings.coupling.coupling;
-  frame.plane_count = FindPlanes(s.scene, s.states, s.generations, s.fingers,
-                                 {.radius_m = s.settings.features.radius_mm * 1e-3,
-                                  .period_s = static_cast<double>(s.settings.period_ns()) * 1e-9},
-                                 frame.planes);
+  const FeatureReach reach{.radius_m = s.settings.features.radius_mm * 1e-3,
+                           .period_s = static_cast<double>(s.settings.period_ns()) * 1e-9};
+  frame.plane_count = FindPlanes(s.scene, s.states, s.generations, s.fingers, reach, frame.planes);
+  if (s.settings.coupling.coupling == protocol::Coupling::kLocal) {
+    frame.local_body_count = FindLocalBodies(s.scene, *s.dynamics, s.states, s.generations,
+                                             std::span(frame.planes).first(frame.plane_count),
+                                             reach, frame.local_bodies);
+    frame.local_substep_ns =
+        static_cast<std::uint64_t>(std::llround(s.settings.physics.substep_ms * 1e6));
+  }
 
   s.health.frames = s.frame;
   s.health.applied = s.ledger.life_books().applied;
   s.health.discarded = s.ledger.life_books().discarded;
-  if (s.settings.coupling.coupling == protocol::Coupling::kPosition) {
-    Vec3 penalty = ToVec3(s.health.penalty_impulse);
-    for (const Kick& kick : kicks) penalty += kick.impulse;
-    s.health.penalty_impulse = ToArray(penalty);
-  }
 }
 
 void WorldStep::Replace(const Scene& scene, std::unique_ptr<DynamicsWorld> dynamics) {

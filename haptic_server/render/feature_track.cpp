@@ -40,6 +40,20 @@ bool SameFeature(const protocol::Plane& a, const protocol::Plane& b) {
          a.feature == b.feature;
 }
 
+HalfSpace InWorld(const Pose& pose_WB, const HalfSpace& plane_B) {
+  return {pose_WB * plane_B.point, pose_WB.orientation * plane_B.normal};
+}
+
+const protocol::LocalBody* FindLocal(const protocol::WorldFrame& frame,
+                                     const protocol::Plane& plane) {
+  const std::size_t count =
+      std::min<std::size_t>(frame.local_body_count, protocol::kMaxLocalBodies);
+  for (const protocol::LocalBody& local : std::span(frame.local_bodies).first(count)) {
+    if (local.body == plane.body && local.generation == plane.generation) return &local;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 FeatureTrack::FeatureTrack(DisplayRule rule, std::int64_t period_ns)
@@ -55,7 +69,7 @@ void FeatureTrack::Advance(std::int64_t ticks) noexcept {
   }
 }
 
-HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
+HalfSpace FeatureTrack::Interpolated(const Feature& feature) const noexcept {
   const double fraction = static_cast<double>(tick_) / ticks_per_frame_;
   const bool at_end = fraction >= 1;
   const double s = at_end ? 1 : fraction;
@@ -78,8 +92,14 @@ HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
   return shown;
 }
 
-void FeatureTrack::Receive(const protocol::WorldFrame& frame,
-                           std::span<const FingerState> fingers) noexcept {
+HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
+  const HalfSpace shown = Interpolated(feature);
+  return feature.rides ? InWorld(feature.pose_WB, shown) : shown;
+}
+
+void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const FingerState> fingers,
+                           const LocalBodies& copies) noexcept {
+  FollowCopies(copies);
   std::array<bool, protocol::kMaxPlanes> paired{};
   std::size_t count = 0;
   const std::size_t planes = std::min<std::size_t>(frame.plane_count, protocol::kMaxPlanes);
@@ -90,6 +110,16 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
     feature.identity = plane;
     feature.last_point = WithoutDenormals(ToVec3(plane.point));
     feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));
+    const protocol::LocalBody* local = FindLocal(frame, plane);
+    const BodyState* copy = copies.Find(plane.body, plane.generation);
+    feature.rides = local != nullptr && copy != nullptr;
+    if (feature.rides) {
+      feature.pose_WB = copy->pose;
+      const Pose pose_BW = Pose{ToVec3(local->position), ToQuat(local->orientation)}.Inverse();
+      const HalfSpace last = InWorld(pose_BW, {feature.last_point, feature.last_normal});
+      feature.last_point = last.point;
+      feature.last_normal = last.normal;
+    }
     // Several planes of one identity pair in their order.
     std::size_t before = 0;
     while (before < count_ && (paired[before] || !SameFeature(features_[before].identity, plane))) {
@@ -98,9 +128,11 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
     if (before < count_) {
       paired[before] = true;
       const Feature& known = features_[before];
-      const HalfSpace now = rule_ == DisplayRule::kInterpolate
-                                ? Displayed(known)
-                                : HalfSpace{known.last_point, known.last_normal};
+      HalfSpace now = rule_ == DisplayRule::kInterpolate
+                          ? Interpolated(known)
+                          : HalfSpace{known.last_point, known.last_normal};
+      if (known.rides) now = InWorld(known.pose_WB, now);
+      if (feature.rides) now = InWorld(feature.pose_WB.Inverse(), now);
       feature.previous_point = now.point;
       feature.previous_normal = now.normal;
       feature.recovery = known.recovery;
@@ -109,8 +141,9 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame,
       feature.previous_point = feature.last_point;
       feature.previous_normal = feature.last_normal;
       const FingerState& finger = fingers[plane.pointer];
-      const double depth =
-          feature.last_normal.dot(feature.last_point - finger.position) + finger.radius;
+      const HalfSpace last{feature.last_point, feature.last_normal};
+      const HalfSpace shown = feature.rides ? InWorld(feature.pose_WB, last) : last;
+      const double depth = shown.normal.dot(shown.point - finger.position) + finger.radius;
       feature.recovery = depth > finger.allowed_depth ? depth - finger.allowed_depth : 0;
       feature.recovery_left = 1;
     }
@@ -129,7 +162,17 @@ void FeatureTrack::Clear() noexcept {
   tick_ = 0;
 }
 
-std::span<const Surface> FeatureTrack::Surfaces() noexcept {
+void FeatureTrack::FollowCopies(const LocalBodies& copies) noexcept {
+  for (std::size_t i = 0; i < count_; ++i) {
+    Feature& feature = features_[i];
+    if (!feature.rides) continue;
+    const BodyState* copy = copies.Find(feature.identity.body, feature.identity.generation);
+    if (copy != nullptr) feature.pose_WB = copy->pose;
+  }
+}
+
+std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexcept {
+  FollowCopies(copies);
   for (std::size_t i = 0; i < count_; ++i) {
     const Feature& feature = features_[i];
     Surface& surface = surfaces_[i];
@@ -138,6 +181,7 @@ std::span<const Surface> FeatureTrack::Surfaces() noexcept {
     surface.generation = feature.identity.generation;
     surface.stiffness = feature.identity.stiffness;
     surface.damping = feature.identity.damping;
+    surface.fixed = feature.identity.inverse_mass == 0;
     surface.plane = Displayed(feature);
     const double below = feature.recovery * feature.recovery_left;
     if (below > 0) surface.plane.point -= below * surface.plane.normal;

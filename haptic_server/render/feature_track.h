@@ -1,5 +1,6 @@
 // What the world sent becomes what is shown: features keep their identity from frame to frame and
-// move between frames by the display rule. Paper 3.1 and 3.2; numerics 1.
+// move between frames by the display rule. Those of a body with a local copy ride on it: the rule
+// then acts in the body's frame. Paper 3.1 and 3.2; numerics 1; design decision 5.
 #pragma once
 
 #include <array>
@@ -9,6 +10,7 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
+#include "haptic_server/render/local_bodies.h"
 #include "haptic_server/settings.h"
 #include "protocol/messages.h"
 
@@ -28,6 +30,7 @@ struct Surface {
   std::uint32_t generation = 0;
   double stiffness = 0;  // N/m; 0 = it brings none of its own
   double damping = 0;    // N s/m, used only where stiffness > 0
+  bool fixed = false;    // the world says that the body cannot move
   HalfSpace plane;       // unit normal
 };
 
@@ -46,14 +49,15 @@ class FeatureTrack {
   void Advance(std::int64_t ticks) noexcept;
 
   /// A frame arrived, to be shown from this tick on (j = 0). `fingers` by pointer index; planes of
-  /// other pointers and damaged planes are ignored. // RT:
-  void Receive(const protocol::WorldFrame& frame, std::span<const FingerState> fingers) noexcept;
+  /// other pointers and damaged planes are ignored. `copies` have received it already. // RT:
+  void Receive(const protocol::WorldFrame& frame, std::span<const FingerState> fingers,
+               const LocalBodies& copies) noexcept;
 
   /// Forgets everything: the world is gone. // RT:
   void Clear() noexcept;
 
   /// What is displayed in this tick; valid until the next call of a member. // RT:
-  std::span<const Surface> Surfaces() noexcept;
+  std::span<const Surface> Surfaces(const LocalBodies& copies) noexcept;
 
   /// Whether the newest frame has a feature of this body near this pointer. // RT:
   bool Has(std::uint32_t body, std::uint32_t generation, std::uint32_t pointer) const noexcept;
@@ -61,12 +65,16 @@ class FeatureTrack {
  private:
   struct Feature {
     protocol::Plane identity;  // and own stiffness
+    bool rides = false;        // points and normals below are in the body's frame, else in W
+    Pose pose_WB;              // where its copy was last
     Vec3 previous_point, last_point;
     Vec3 previous_normal, last_normal;
     double recovery = 0;       // m, how far below its place it started
     double recovery_left = 0;  // 1..0
   };
 
+  void FollowCopies(const LocalBodies& copies) noexcept;
+  HalfSpace Interpolated(const Feature& feature) const noexcept;
   HalfSpace Displayed(const Feature& feature) const noexcept;
 
   DisplayRule rule_;

@@ -177,6 +177,7 @@ void Ledger::Book(const Entry& entry) noexcept {
 
   Vec3 to_bodies = Vec3::Zero();
   protocol::ImpulseUnits booked{};
+  booked_count_ = 0;
   for (Account& account : accounts_) {
     if (!account.used) continue;
     Vec3 force = Vec3::Zero();
@@ -190,23 +191,36 @@ void Ledger::Book(const Entry& entry) noexcept {
       }
     }
     const protocol::ImpulseUnits before = account.channel.impulse;
+    const protocol::ImpulseUnits angular_before = account.channel.angular_impulse;
     Pay(account, force, point, correction_s);
-    booked = Plus(booked, Minus(account.channel.impulse, before));
+    const protocol::ImpulseUnits added = Minus(account.channel.impulse, before);
+    booked = Plus(booked, added);
     to_bodies += force;
+    if (added != protocol::ImpulseUnits{} && booked_count_ < kMaxTickImpulses) {
+      booked_[booked_count_++] = {
+          account.channel.body, account.channel.generation, InNewtonSeconds(added),
+          InNewtonSeconds(Minus(account.channel.angular_impulse, angular_before))};
+    }
   }
 
   const protocol::ImpulseUnits total =
       total_quantizer_.Add(-entry.displayed * period_s_ + total_force_ * correction_s);
   const protocol::ImpulseUnits to_ground = Minus(total, booked);
-  const Vec3 ground_force = -entry.displayed - to_bodies;
+  Vec3 rest = -entry.displayed - to_bodies;  // without the fixed bodies' part it is nobody's
+  Vec3 ground_moment = Vec3::Zero();
+  for (const BodyShare& share : entry.wanted) {
+    if (!share.fixed) continue;
+    const Vec3 force = -fraction * share.force;
+    rest -= force;
+    ground_moment += share.point.cross(force);
+  }
+  ground_moment += entry.finger.cross(rest);
   ground_.impulse = Plus(ground_.impulse, to_ground);
   ground_.angular_impulse =
       Plus(ground_.angular_impulse,
-           ground_angular_.Add(entry.finger.cross(ground_force * period_s_) +
-                               ground_point_.cross(ground_force_ * correction_s)));
+           ground_angular_.Add(ground_moment * period_s_ + ground_moment_ * correction_s));
   total_force_ = -entry.displayed;
-  ground_force_ = ground_force;
-  ground_point_ = entry.finger;
+  ground_moment_ = ground_moment;
 
   books_.displayed = Plus(books_.displayed, booked);
   books_.ground = ground_.impulse;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/geometry.h"
+#include "haptic_server/render/local_bodies.h"
 #include "haptic_server/render/surface_force.h"
 #include "protocol/messages.h"
 
@@ -59,13 +60,19 @@ class Ledger {
     std::int64_t previous_duration_ns = 0;  // true t_k - t_(k-1)
     std::uint32_t pointer = 0;
     Vec3 displayed = Vec3::Zero();      // N, on the user
-    std::span<const BodyShare> wanted;  // each with an open channel
-    Vec3 finger = Vec3::Zero();         // m, centre: where the ground's part acts
+    std::span<const BodyShare> wanted;  // each with an open channel, unless its body is fixed
+    Vec3 finger = Vec3::Zero();         // m, centre: where what belongs to nobody acts
   };
 
   /// Books the next tick, from 0: body shares scaled by clip(displayed . wanted / |wanted|^2, 0,
-  /// 1), the rest to the ground. Every unit of the displayed force goes somewhere. // RT:
+  /// 1), those of fixed bodies and the rest to the ground. Every unit of the displayed force goes
+  /// somewhere. // RT:
   void Book(const Entry& entry) noexcept;
+
+  /// What that added to each open channel, as it is published; at most kMaxTickImpulses. // RT:
+  std::span<const BodyImpulse> Booked() const noexcept {
+    return std::span(booked_).first(booked_count_);
+  }
 
   /// Closes channels of `pointer` that are idle and whose body `is_near` does not know. // RT:
   template <typename IsNear>
@@ -106,9 +113,10 @@ class Ledger {
   protocol::GroundChannel ground_;
   ImpulseQuantizer total_quantizer_;
   ImpulseQuantizer ground_angular_;
-  Vec3 total_force_ = Vec3::Zero();  // N, minus the displayed force of the tick before
-  Vec3 ground_force_ = Vec3::Zero();
-  Vec3 ground_point_ = Vec3::Zero();
+  Vec3 total_force_ = Vec3::Zero();    // N, minus the displayed force of the tick before
+  Vec3 ground_moment_ = Vec3::Zero();  // N m, about the world origin, of the tick before
+  std::array<BodyImpulse, kMaxTickImpulses> booked_;
+  std::size_t booked_count_ = 0;
 
   protocol::Books books_;
   std::vector<protocol::ImpulseUnits>

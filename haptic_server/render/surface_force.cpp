@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "haptic_server/render/feature_track.h"
+
 namespace rikiseki::haptic {
 
 SurfaceForce::SurfaceForce(const RenderSettings& settings, double period_s)
@@ -10,9 +12,19 @@ SurfaceForce::SurfaceForce(const RenderSettings& settings, double period_s)
       adhesion_(settings.adhesion),
       period_s_(period_s) {}
 
-std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
-                                                const ContactSolution& contact, double radius,
-                                                std::int64_t elapsed_ticks) noexcept {
+BodyShare SurfaceForce::ShareOf(const BodyContact& body, const Vec3& force) noexcept {
+  return {.body = body.body,
+          .generation = body.generation,
+          .force = force,
+          .point = body.point,
+          .fixed = body.fixed,
+          .stiffness = body.stiffness,
+          .damping = body.damping};
+}
+
+std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
+                                          const ContactSolution& contact, double radius,
+                                          std::int64_t elapsed_ticks) noexcept {
   std::array<BodyContact, kMaxContactPlanes> now;
   std::size_t count = 0;
   for (std::size_t i = 0; i < std::min(surfaces.size(), kMaxContactPlanes); ++i) {
@@ -27,12 +39,15 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
       now[count++] = {};
       body->body = surface.body;
       body->generation = surface.generation;
+      body->fixed = surface.fixed;
     }
     const bool own = surface.stiffness > 0;
     const Vec3 displacement = multiplier * surface.plane.normal;
     body->displacement += displacement;
-    body->spring += (own ? surface.stiffness : stiffness_) * displacement;
-    body->damping += (own ? surface.damping : damping_) * multiplier;  // weighted; divided below
+    const double stiffness = own ? surface.stiffness : stiffness_;
+    body->spring += stiffness * displacement;
+    body->stiffness += stiffness * multiplier;  // weighted, like damping; divided below
+    body->damping += (own ? surface.damping : damping_) * multiplier;
     body->weight += multiplier;
   }
 
@@ -42,6 +57,7 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
   std::array<bool, kMaxContactPlanes> went_on{};
   for (std::size_t i = 0; i < count; ++i) {
     BodyContact& body = now[i];
+    body.stiffness /= body.weight;
     body.damping /= body.weight;
     body.point = contact.proxy - radius * body.displacement.stableNormalized();
     Vec3 before = Vec3::Zero();
@@ -53,7 +69,8 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
     }
     const Vec3 force = body.spring + body.damping * (body.displacement - before) / elapsed_s;
     if (!adhesion_ && !(force.dot(body.displacement) > 0)) continue;
-    shares_[share_count++] = {body.body, body.generation, force, body.point};
+    shares_[share_count++] = ShareOf(body, force);
+    shares_[share_count - 1].displacement = body.displacement;
   }
   if (adhesion_) {  // e = 0 from now on: the damper pulls once more, which makes its impulse add up
                     // to 0
@@ -61,7 +78,7 @@ std::span<const BodyShare> SurfaceForce::Update(std::span<const Surface> surface
       const BodyContact& body = contacts_[j];
       if (went_on[j]) continue;
       const Vec3 force = -body.damping * body.displacement / elapsed_s;
-      shares_[share_count++] = {body.body, body.generation, force, body.point};
+      shares_[share_count++] = ShareOf(body, force);
     }
   }
   std::copy_n(now.begin(), count, contacts_.begin());

@@ -9,7 +9,6 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
-#include "haptic_server/render/feature_track.h"
 #include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
@@ -18,8 +17,12 @@ namespace rikiseki::haptic {
 struct BodyShare {
   std::uint32_t body = 0;
   std::uint32_t generation = 0;
-  Vec3 force = Vec3::Zero();  // N, on the user
-  Vec3 point = Vec3::Zero();  // m, where the opposite impulse acts on the body: D - r n
+  Vec3 force = Vec3::Zero();         // N, on the user
+  Vec3 point = Vec3::Zero();         // m, where the opposite impulse acts on the body: D - r n
+  bool fixed = false;                // the body cannot move: its share belongs to the ground
+  Vec3 displacement = Vec3::Zero();  // m, e_b
+  double stiffness = 0;              // N/m, and damping, N s/m, that made the force
+  double damping = 0;
 };
 
 inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
@@ -29,6 +32,8 @@ inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
 /// the tick before)/T. With equal k and d this is the paper's f = k e + d (e - e_before)/T, split
 /// without remainder. Without `adhesion` a body only pushes: f_b is dropped where f_b . e_b <= 0,
 /// and when the finger is free.
+struct Surface;
+
 class SurfaceForce {
  public:
   SurfaceForce(const RenderSettings& settings, double period_s);
@@ -36,9 +41,8 @@ class SurfaceForce {
   /// `elapsed_ticks` is 1, or more after missed deadlines: the difference quotient runs over that
   /// many *nominal* periods, so that jitter of the wake-up does not become jitter of the force. //
   /// RT:
-  std::span<const BodyShare> Update(std::span<const Surface> surfaces,
-                                    const ContactSolution& contact, double radius,
-                                    std::int64_t elapsed_ticks) noexcept;
+  std::span<BodyShare> Update(std::span<const Surface> surfaces, const ContactSolution& contact,
+                              double radius, std::int64_t elapsed_ticks) noexcept;
 
   /// The finger is free, whatever came before. // RT:
   void Reset() noexcept { count_ = 0; }
@@ -47,12 +51,16 @@ class SurfaceForce {
   struct BodyContact {
     std::uint32_t body = 0;
     std::uint32_t generation = 0;
+    bool fixed = false;
+    double stiffness = 0;
     double damping = 0;
     Vec3 displacement = Vec3::Zero();  // e_b
     Vec3 spring = Vec3::Zero();        // N
     Vec3 point = Vec3::Zero();
     double weight = 0;
   };
+
+  static BodyShare ShareOf(const BodyContact& body, const Vec3& force) noexcept;
 
   double stiffness_;
   double damping_;

@@ -54,6 +54,7 @@ bool CoupledRun::Tick() {
 }
 
 void CoupledRun::TickWorld(std::int64_t advance_ns) {
+  if (lapped_) world_.Consume(haptic_tick_);
   world_.Tick(Seconds(advance_ns), world_frame_);
   under_way_.push_back({tick_ + (tick_ < 0 ? 0 : latency_ticks_), world_frame_});
 }
@@ -71,7 +72,7 @@ void CoupledRun::TickHaptic() {
                                  .frame = arrives ? &under_way_.front().frame : nullptr};
   haptic_.Tick(time, world, haptic_tick_);
   if (arrives) under_way_.pop_front();
-  world_.Consume(haptic_tick_);
+  if (!lapped_) world_.Consume(haptic_tick_);
   ++tick_;
 }
 

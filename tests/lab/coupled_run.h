@@ -35,6 +35,10 @@ class CoupledRun {
              std::unique_ptr<world::DynamicsWorld> dynamics, int phase_ticks,
              int latency_ticks = 0);
 
+  /// From now on the world sees only the newest message before each of its ticks, as if all others
+  /// had been overwritten unread.
+  void LapTheWorld() { lapped_ = true; }
+
   /// When tick 0 happens, in virtual time.
   static std::int64_t StartNs(const haptic::Settings& settings) {
     return kMeetingTicks * settings.period_ns();
@@ -78,6 +82,7 @@ class CoupledRun {
   world::WorldStep world_;
   protocol::HapticTick haptic_tick_;
   protocol::WorldFrame world_frame_;
+  bool lapped_ = false;
   std::deque<Sent> under_way_;
 };
 

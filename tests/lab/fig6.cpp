@@ -52,6 +52,7 @@ haptic::Settings HapticSettings(const BlockPush& push) {
   settings.render.adhesion = true;
   settings.render.display = push.display;
   settings.render.finger_radius_mm = 0;
+  settings.render.position_rule = PositionRule::kSemiImplicit;  // of the written experiment
   settings.safety.force_cap_n = kUnlimited;
   settings.safety.slew_limit_n_per_s = kUnlimited * 1e6;  // the whole cap in a microsecond
   settings.safety.speed_limit_m_per_s = kUnlimited;
@@ -63,6 +64,8 @@ world::Settings WorldSettings(const BlockPush& push) {
   world::Settings settings;
   settings.loop.rate_hz = 1 / push.world_period_s;
   settings.coupling.coupling = push.coupling;
+  settings.coupling.replay =
+      push.local == LocalVariant::kLump ? world::ReplayRule::kLump : world::ReplayRule::kTicks;
   settings.coupling.force_cap_n = kUnlimited;
   settings.features.radius_mm = kUnlimited;
   return settings;
@@ -82,9 +85,12 @@ world::Scene SlidingScene(const BlockPush& push) {
   block.mass_kg = push.mass_kg;
   block.inertia = Mat3::Identity();
   block.colliders = {MakeCollider(world::HalfSpace{.normal = -Vec3::UnitX()}, push.friction)};
+  world::SceneBody floor;
+  floor.name = "floor";
+  floor.fixed = true;
   world::Scene scene;
   scene.name = "fig6";
-  scene.bodies = {block};
+  scene.bodies = {block, floor};
   return scene;
 }
 
@@ -121,14 +127,18 @@ BlockPushResult SimulateBlockPush(const BlockPush& push) {
     dynamics =
         std::make_unique<world::BulletWorld>(scene, world_settings.physics.substep_ms * 1e-3);
   } else {
-    dynamics = std::make_unique<world::SlidingBlock>(scene, push.friction,
-                                                     push.world == PushedWorld::kExactSlide
-                                                         ? world::SlideRule::kExact
-                                                         : world::SlideRule::kSemiImplicit);
+    // A world that replays ticks steps by the rule of the copy.
+    const bool replays =
+        push.coupling == protocol::Coupling::kLocal && push.local != LocalVariant::kLump;
+    const bool exact = push.world == PushedWorld::kExactSlide && !replays;
+    dynamics = std::make_unique<world::SlidingBlock>(
+        scene, push.friction, exact ? world::SlideRule::kExact : world::SlideRule::kSemiImplicit,
+        replays ? push.haptic_period_s : std::numeric_limits<double>::infinity());
   }
   IdealDevice device(MakeHand(push.scenario), CoupledRun::StartNs(haptic_settings));
   CoupledRun run(haptic_settings, device, world_settings, scene, std::move(dynamics),
                  push.phase_ticks);
+  if (push.local == LocalVariant::kBlock) run.LapTheWorld();
 
   BlockPushResult result;
   const auto block = [&]() -> const protocol::Body& { return run.world().Bodies()[0]; };
@@ -154,6 +164,7 @@ struct Method {
   const char* name;  // in the tables
   protocol::Coupling coupling;
   haptic::DisplayRule display;
+  LocalVariant local = LocalVariant::kTicks;
 };
 
 constexpr Method kMethods[] = {
@@ -161,6 +172,12 @@ constexpr Method kMethods[] = {
     {"impulse_interp", protocol::Coupling::kImpulse, haptic::DisplayRule::kInterpolate},
     {"impulse_hold", protocol::Coupling::kImpulse, haptic::DisplayRule::kHold},
     {"impulse_extrap", protocol::Coupling::kImpulse, haptic::DisplayRule::kExtrapolate},
+    {"local_SE", protocol::Coupling::kLocal, haptic::DisplayRule::kInterpolate,
+     LocalVariant::kLump},
+    {"local_M1", protocol::Coupling::kLocal, haptic::DisplayRule::kInterpolate,
+     LocalVariant::kBlock},
+    {"local_AUTH", protocol::Coupling::kLocal, haptic::DisplayRule::kInterpolate,
+     LocalVariant::kTicks},
 };
 
 // Nothing for a method that is not built.
@@ -172,6 +189,7 @@ std::optional<BlockPush> ParsePush(const Row& row) {
   if (method == std::end(kMethods)) return std::nullopt;
   push.coupling = method->coupling;
   push.display = method->display;
+  push.local = method->local;
 
   const std::string scenario = row.Text("scenario");
   if (scenario != "P" && scenario != "H") row.Refuse("scenario", "P or H is expected");

@@ -19,12 +19,20 @@ enum class PushedWorld {
   kBullet,             // BULLET: the engine, with a 6 cm cube on a floor
 };
 
+/// How `local` gets the push to the world.
+enum class LocalVariant {
+  kTicks,  // AUTH: every tick is replayed
+  kBlock,  // M1: only the newest message of a period arrives, the rest was overwritten unread
+  kLump,   // SE: one kick per world tick, the naive way
+};
+
 /// One push of the block, whose face is at x = 0 at rest.
 struct BlockPush {
   PushScenario scenario = PushScenario::kPoke;
   PushedWorld world = PushedWorld::kExactSlide;
   protocol::Coupling coupling = protocol::Coupling::kImpulse;
   haptic::DisplayRule display = haptic::DisplayRule::kInterpolate;
+  LocalVariant local = LocalVariant::kTicks;  // where the coupling is `local`
   double haptic_period_s = 1e-3;
   double world_period_s = 0.05;  // a whole number of haptic periods
   double stiffness_n_per_m = 2000;

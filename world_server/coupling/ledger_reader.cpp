@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace rikiseki::world {
 namespace {
@@ -12,6 +13,9 @@ using protocol::ImpulseUnits;
 // No finger reaches farther from the world origin: bounds hostile angular totals through the gap
 // rule.
 constexpr double kLongestLever = 10.0;  // m
+
+// A message that covers more is damaged or hostile.
+constexpr std::uint64_t kLongestTickNs = 10'000'000'000;
 
 // What stays within an int64 of impulse units with room to spare, whatever the configuration says.
 constexpr double kLargestCountable = 4e6;  // N s, N m s
@@ -60,6 +64,8 @@ void LedgerReader::SetBodies(std::vector<BodyTag> bodies) {
   owed_before_ = {};
   bodies_ = std::move(bodies);
   owed_.assign(bodies_.size(), {});
+  for (ReplayTick& tick : replay_.ticks) tick.end = 0;
+  replay_.impulses.clear();
 }
 
 void LedgerReader::BeginEpoch(std::uint64_t epoch) {
@@ -78,7 +84,8 @@ void LedgerReader::Discard(const ImpulseUnits& impulse, DiscardReason reason) {
   }
 }
 
-std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::HapticTick& tick) {
+std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::HapticTick& tick,
+                                                                double length_s) {
   const std::size_t count = std::min(tick.channel_count, protocol::kMaxChannels);
   std::vector<KnownChannel> present;
   std::vector<Increment> increments;
@@ -90,7 +97,9 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
                            .pointer = channel.pointer,
                            .opened_tick = channel.opened_tick,
                            .impulse = channel.impulse,
-                           .angular_impulse = channel.angular_impulse};
+                           .angular_impulse = channel.angular_impulse,
+                           .first_moment = ToVec3(channel.first_moment),
+                           .angular_first_moment = ToVec3(channel.angular_first_moment)};
     present.push_back(now);
 
     KnownChannel before = now;
@@ -99,11 +108,16 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
       before = *known;
     } else if (has_baseline_ && channel.opened_tick > last_tick_) {
       before.impulse = before.angular_impulse = {};
+      before.first_moment = before.angular_first_moment = Vec3::Zero();
     }  // else it is part of the baseline, or its history is unknown: it counts from here
-    increments.push_back({.body = channel.body,
-                          .generation = channel.generation,
-                          .impulse = Minus(now.impulse, before.impulse),
-                          .angular_impulse = Minus(now.angular_impulse, before.angular_impulse)});
+    increments.push_back(
+        {.body = channel.body,
+         .generation = channel.generation,
+         .impulse = Minus(now.impulse, before.impulse),
+         .angular_impulse = Minus(now.angular_impulse, before.angular_impulse),
+         .first_moment = now.first_moment - before.first_moment - length_s * InSi(before.impulse),
+         .angular_first_moment = now.angular_first_moment - before.angular_first_moment -
+                                 length_s * InSi(before.angular_impulse)});
   }
   known_ = std::move(present);
   return increments;
@@ -111,12 +125,22 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
 
 bool LedgerReader::Consume(const protocol::HapticTick& tick) {
   if (has_baseline_ && tick.tick <= last_tick_) return false;
-  const std::vector<Increment> increments = IncrementsOf(tick);
+  const std::uint64_t ticks = has_baseline_ ? tick.tick - last_tick_ : 1;
+  const std::uint64_t length_ns = !has_baseline_ ? 0
+                                  : ticks > 1    ? tick.start_ns - last_start_ns_
+                                                 : tick.previous_duration_ns;
+  const double length_s = static_cast<double>(std::min(length_ns, kLongestTickNs)) * 1e-9;
+  const std::vector<Increment> increments = IncrementsOf(tick, length_s);
   if (!has_baseline_) {
     has_baseline_ = true;
     baseline_tick_ = tick.tick;
   }
   last_tick_ = tick.tick;
+  last_start_ns_ = tick.start_ns;
+  const bool replays = coupling_ == protocol::Coupling::kLocal;
+  if (replays) {
+    replay_.ticks.push_back({.length_s = length_s, .ticks = ticks, .end = replay_.impulses.size()});
+  }
 
   const bool by_position = coupling_ == protocol::Coupling::kPosition;
   const bool foreign = own_epoch_ != 0 && tick.world_epoch != own_epoch_;
@@ -148,8 +172,17 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
       OwedUnits& owed = owed_[increment.body];
       owed.impulse = Plus(owed.impulse, increment.impulse);
       owed.angular_impulse = Plus(owed.angular_impulse, increment.angular_impulse);
+      const bool nothing =
+          increment.impulse == ImpulseUnits{} && increment.angular_impulse == ImpulseUnits{};
+      if (!replays || nothing) continue;
+      replay_.impulses.push_back({.body = increment.body,
+                                  .impulse = InSi(increment.impulse),
+                                  .angular_impulse = InSi(increment.angular_impulse),
+                                  .first_moment = increment.first_moment,
+                                  .angular_first_moment = increment.angular_first_moment});
     }
   }
+  if (replays) replay_.ticks.back().end = replay_.impulses.size();
   return true;
 }
 
@@ -169,6 +202,9 @@ std::span<const PendingImpulse> LedgerReader::Take() {
   epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, owed_before_));
   owed_before_ = {};
   consumed_ns_ = consumed_nms_ = 0;
+  std::swap(taken_replay_, replay_);
+  replay_.ticks.clear();
+  replay_.impulses.clear();
   return taken_;
 }
 

@@ -30,6 +30,30 @@ struct PendingImpulse {
   Vec3 angular_impulse = Vec3::Zero();  // N m s
 };
 
+/// What one body got within a ReplayTick, about the world origin, in W.
+struct ReplayImpulse {
+  std::size_t body = 0;
+  Vec3 impulse = Vec3::Zero();          // N s
+  Vec3 angular_impulse = Vec3::Zero();  // N m s
+  // Only where messages were lost: the integral of what had arrived so far over the lost time, N s^2
+  // and N m s^2, which says when within it the impulse came.
+  Vec3 first_moment = Vec3::Zero();
+  Vec3 angular_first_moment = Vec3::Zero();
+};
+
+/// One consumed message, for `local`: the time it covers and what was displayed in it.
+struct ReplayTick {
+  double length_s = 0;
+  std::uint64_t ticks = 1;  // more where messages were overwritten unread: this is their sum
+  std::size_t end = 0;      // its impulses end here and begin where those of the tick before end
+};
+
+/// All messages since the world tick before, in order.
+struct Replay {
+  std::vector<ReplayTick> ticks;
+  std::vector<ReplayImpulse> impulses;
+};
+
 /// Linear impulse since a baseline.
 struct LedgerBooks {
   protocol::ImpulseUnits applied{};
@@ -57,6 +81,9 @@ class LedgerReader {
   /// Hands out what every body is owed, which counts as applied, and closes the world tick.
   std::span<const PendingImpulse> Take();
 
+  /// The same, message by message, of the last Take(); empty unless the coupling is `local`.
+  const Replay& replay() const { return taken_replay_; }
+
   std::uint64_t acked_epoch() const { return has_baseline_ ? epoch_ : 0; }
   std::uint64_t acked_tick() const { return has_baseline_ ? last_tick_ : 0; }
   std::uint64_t baseline_tick() const { return has_baseline_ ? baseline_tick_ : 0; }
@@ -72,6 +99,8 @@ class LedgerReader {
     std::uint64_t opened_tick = 0;
     protocol::ImpulseUnits impulse{};
     protocol::ImpulseUnits angular_impulse{};
+    Vec3 first_moment = Vec3::Zero();
+    Vec3 angular_first_moment = Vec3::Zero();
 
     bool Is(const protocol::Channel& channel) const;
   };
@@ -79,6 +108,8 @@ class LedgerReader {
     std::uint32_t body = 0, generation = 0;
     protocol::ImpulseUnits impulse{};
     protocol::ImpulseUnits angular_impulse{};
+    Vec3 first_moment = Vec3::Zero();  // of what came since the message before
+    Vec3 angular_first_moment = Vec3::Zero();
   };
   struct OwedUnits {
     protocol::ImpulseUnits impulse{};
@@ -86,7 +117,7 @@ class LedgerReader {
   };
 
   /// Growth of every channel since the message before, which this one replaces.
-  std::vector<Increment> IncrementsOf(const protocol::HapticTick& tick);
+  std::vector<Increment> IncrementsOf(const protocol::HapticTick& tick, double length_s);
   void Discard(const protocol::ImpulseUnits& impulse, protocol::DiscardReason reason);
 
   std::uint64_t own_epoch_;
@@ -97,6 +128,7 @@ class LedgerReader {
   bool has_baseline_ = false;
   std::uint64_t baseline_tick_ = 0;
   std::uint64_t last_tick_ = 0;
+  std::uint64_t last_start_ns_ = 0;
   std::vector<KnownChannel> known_;  // of the last message
 
   std::vector<BodyTag> bodies_;
@@ -105,6 +137,7 @@ class LedgerReader {
   double consumed_ns_ = 0;                // sum of |q| over this world tick
   double consumed_nms_ = 0;               // of the angular ones
   std::vector<PendingImpulse> taken_;
+  Replay replay_, taken_replay_;
 
   LedgerBooks epoch_books_;
   LedgerBooks life_books_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "common/body_step.h"
 #include "world_server/features/nearest_point.h"
 
 namespace rikiseki::world {
@@ -14,6 +15,14 @@ constexpr double kFarthest = 1e9;  // m, m/s
 
 bool Usable(const Vec3& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= kFarthest;
+}
+
+// 1/M_eff of the body at a point along a direction; 0 = it cannot move.
+double Mobility(const SceneBody& body, const BodyState& state, const Vec3& point,
+                const Vec3& direction) {
+  if (body.fixed) return 0;
+  return InverseEffectiveMass(BodyInertia::Of(body.mass_kg, body.inertia), state.pose, point,
+                              direction);
 }
 
 struct Candidate {
@@ -73,7 +82,9 @@ std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
                        .point = ToArray(point),
                        .normal = ToArray(Vec3(pose_WS.orientation * nearest.normal)),
                        .stiffness = collider.stiffness_n_per_m.value_or(0),
-                       .damping = collider.damping_ns_per_m.value_or(0)};
+                       .damping = collider.damping_ns_per_m.value_or(0),
+                       .inverse_mass = Mobility(scene.bodies[body], state, point,
+                                                pose_WS.orientation * nearest.normal)};
       }
     }
   }

@@ -266,9 +266,8 @@ void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   if (!engine_) return;
   for (const Kick& kick : kicks) engine_->Apply(kick);
   if (period_s > 0) {
-    // 50 ms of 1 ms is 50 substeps, whatever the last bit of the quotient says.
-    const double count = std::max(1.0, std::ceil(period_s / longest_substep_s_ - 1e-9));
-    for (double done = 0; done < count; ++done) engine_->Substep(period_s / count);
+    const int count = SubstepCount(period_s, longest_substep_s_);
+    for (int done = 0; done < count; ++done) engine_->Substep(period_s / count);
   }
   for (std::size_t i = 0; i < states_.size(); ++i) {
     if (engine_->bodies[i].moving != Engine::kFixed)

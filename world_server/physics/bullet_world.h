@@ -17,7 +17,7 @@ namespace rikiseki::world {
 
 class BulletWorld final : public DynamicsWorld {
  public:
-  /// A period is divided into equal substeps, none longer than `longest_substep_s`. Throws
+  /// A period is divided into equal substeps, see SubstepCount. Throws
   /// std::invalid_argument on what the engine cannot take: a moving body without a mass, a positive
   /// definite inertia or a shape, with a half-space, or with shapes of different friction.
   BulletWorld(const Scene& scene, double longest_substep_s);

@@ -3,10 +3,16 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "common/body_step.h"
+
 namespace rikiseki::world {
 
-SlidingBlock::SlidingBlock(const Scene& scene, double friction, SlideRule rule)
-    : friction_(friction), deceleration_(friction * std::abs(scene.gravity.z())), rule_(rule) {
+SlidingBlock::SlidingBlock(const Scene& scene, double friction, SlideRule rule,
+                           double longest_substep_s)
+    : friction_(friction),
+      deceleration_(friction * std::abs(scene.gravity.z())),
+      rule_(rule),
+      longest_substep_s_(longest_substep_s) {
   std::size_t moving = 0;
   for (const SceneBody& body : scene.bodies) {
     states_.push_back({.pose = body.pose_WB});
@@ -36,20 +42,25 @@ void SlidingBlock::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   for (const Kick& kick : kicks) {
     if (kick.body == block_) velocity_ += kick.impulse.x() / mass_kg_;
   }
+  const int count = SubstepCount(period_s, longest_substep_s_);
+  for (int done = 0; done < count; ++done) Substep(period_s / count);
+}
+
+void SlidingBlock::Substep(double step_s) {
   const double v = velocity_;
-  const double loss = deceleration_ * period_s;
+  const double loss = deceleration_ * step_s;
   const bool stops = std::abs(v) <= loss;
   velocity_ = stops ? 0 : v - std::copysign(loss, v);
   switch (rule_) {
     case SlideRule::kExact:
       if (!stops) {
-        displacement_ += period_s * v - std::copysign(loss, v) * period_s / 2;
+        displacement_ += step_s * v - std::copysign(loss, v) * step_s / 2;
       } else if (v != 0) {
         displacement_ += v * std::abs(v) / (2 * deceleration_);
       }
       break;
     case SlideRule::kSemiImplicit:
-      displacement_ += period_s * velocity_;
+      displacement_ += step_s * velocity_;
       break;
   }
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "world_server/physics/dynamics_world.h"
@@ -16,13 +17,15 @@ enum class SlideRule {
   kSemiImplicit,  // SE: friction first, then x += Tw v; stops v Tw / 2 short
 };
 
-/// The scene's only moving body slides; the others stay. One period is one step of the rule.
+/// The scene's only moving body slides; the others stay. One period is one step of the rule, or as
+/// many as SubstepCount says where a longest substep is given.
 /// Rotation, and impulses across x, do nothing.
 class SlidingBlock final : public DynamicsWorld {
  public:
   /// `friction` is that of block and floor combined; the weight is along z of `scene.gravity`.
   /// Throws std::invalid_argument unless exactly one body moves and has a mass.
-  SlidingBlock(const Scene& scene, double friction, SlideRule rule);
+  SlidingBlock(const Scene& scene, double friction, SlideRule rule,
+               double longest_substep_s = std::numeric_limits<double>::infinity());
 
   std::size_t body_count() const override { return states_.size(); }
   BodyState State(std::size_t body) const override;
@@ -33,6 +36,8 @@ class SlidingBlock final : public DynamicsWorld {
                     std::vector<ContactSite>& sites) const override;
 
  private:
+  void Substep(double step_s);
+
   std::vector<BodyState> states_;  // at the start
   std::size_t block_ = 0;
   std::size_t floor_ = 0;  // a fixed body, if there is one
@@ -40,6 +45,7 @@ class SlidingBlock final : public DynamicsWorld {
   double mass_kg_ = 0;
   double deceleration_ = 0;  // mu g, m/s^2
   SlideRule rule_;
+  double longest_substep_s_;
   double displacement_ = 0;  // m along x since the start
   double velocity_ = 0;      // m/s along x
 };

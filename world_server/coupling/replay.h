@@ -1,0 +1,18 @@
+// `local`: the world repeats the push as it was displayed, tick by tick, so that it moves as the
+// haptic side's copies did. Substeps as long as a tick only where the finger pushed. numerics 4.
+#pragma once
+
+#include "world_server/coupling/ledger_reader.h"
+#include "world_server/physics/dynamics_world.h"
+
+namespace rikiseki::world {
+
+/// Advances the world by `period_s`: every tick's impulses as kicks at each body's present centre,
+/// then the length of the tick. Where messages were lost, their sum enters in as many blocks as
+/// ticks were lost, in a linear profile that has the same impulse and the same first moment. What
+/// the ticks do not cover passes before them; where they cover more, they are shortened alike.
+/// `largest_impulse_ns` bounds what a first moment may say.
+void ReplayPush(const Replay& replay, double period_s, double largest_impulse_ns,
+                DynamicsWorld& world);
+
+}  // namespace rikiseki::world

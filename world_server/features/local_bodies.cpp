@@ -1,0 +1,124 @@
+#include "world_server/features/local_bodies.h"
+
+#include <algorithm>
+
+#include "world_server/physics/bullet_shapes.h"
+
+namespace rikiseki::world {
+namespace {
+
+struct Candidate {
+  std::size_t body = 0;
+  std::vector<ContactSite> sites;
+};
+
+class Search {
+ public:
+  Search(const Scene& scene, const DynamicsWorld& dynamics, std::span<const BodyState> states,
+         const FeatureReach& reach, std::size_t room)
+      : scene_(scene), dynamics_(dynamics), states_(states), reach_(reach), room_(room) {}
+
+  /// Adds the body and the neighbours it needs, or nothing.
+  void Add(std::size_t body) {
+    const std::size_t before = found_.size();
+    if (!AddWithNeighbours(body)) found_.resize(before);
+  }
+
+  const std::vector<Candidate>& found() const { return found_; }
+
+  bool Has(std::size_t body) const {
+    return std::any_of(found_.begin(), found_.end(),
+                       [=](const Candidate& other) { return other.body == body; });
+  }
+
+ private:
+  bool AddWithNeighbours(std::size_t body) {
+    if (Has(body)) return true;
+    if (found_.size() == room_) return false;
+    std::vector<ContactSite> sites;
+    if (!dynamics_.FindContacts(body, Reach(body), sites)) return false;
+    if (sites.size() > protocol::kMaxContactPlanes) return false;
+    const std::size_t place = found_.size();
+    found_.push_back({.body = body, .sites = std::move(sites)});
+    for (std::size_t i = 0; i < found_[place].sites.size(); ++i) {
+      const std::size_t other = found_[place].sites[i].other;
+      if (scene_.bodies[other].fixed) continue;
+      const std::size_t before = found_.size();
+      if (AddWithNeighbours(other)) continue;
+      found_.resize(before);
+      if (scene_.bodies[other].mass_kg < kHeavyNeighbour * scene_.bodies[body].mass_kg)
+        return false;
+    }
+    return true;
+  }
+
+  double Reach(std::size_t body) const {
+    double outer = 0;
+    for (const Collider& collider : scene_.bodies[body].colliders) {
+      if (std::holds_alternative<HalfSpace>(collider.shape)) continue;
+      outer = std::max(outer, collider.pose_BS.position.norm() + OuterRadius(collider.shape));
+    }
+    const BodyState& state = states_[body];
+    const double speed = state.velocity.norm() + outer * state.angular_velocity.norm();
+    return reach_.radius_m + 2 * reach_.period_s * speed;
+  }
+
+  const Scene& scene_;
+  const DynamicsWorld& dynamics_;
+  std::span<const BodyState> states_;
+  FeatureReach reach_;
+  std::size_t room_;
+  std::vector<Candidate> found_;
+};
+
+protocol::ContactPlane ToPlane(const ContactSite& site,
+                               std::span<const std::uint32_t> generations) {
+  return {.other_body = static_cast<std::uint32_t>(site.other),
+          .other_generation = generations[site.other],
+          .point = ToArray(site.p_B),
+          .normal = ToArray(site.normal),
+          .gap = site.gap,
+          .friction = site.friction,
+          .other_velocity = ToArray(site.other_velocity),
+          .other_inverse_mass = site.other_inverse_mass,
+          .impulse = ToArray(site.impulse),
+          .radius = site.radius};
+}
+
+}  // namespace
+
+std::uint32_t FindLocalBodies(const Scene& scene, const DynamicsWorld& dynamics,
+                              std::span<const BodyState> states,
+                              std::span<const std::uint32_t> generations,
+                              std::span<const protocol::Plane> planes, const FeatureReach& reach,
+                              std::span<protocol::LocalBody> local_bodies) {
+  Search search(scene, dynamics, states, reach, local_bodies.size());
+  for (const protocol::Plane& plane : planes) {
+    if (!scene.bodies[plane.body].fixed) search.Add(plane.body);
+  }
+  std::uint32_t count = 0;
+  for (const Candidate& candidate : search.found()) {
+    const SceneBody& body = scene.bodies[candidate.body];
+    const BodyState& state = states[candidate.body];
+    protocol::LocalBody& local = local_bodies[count++];
+    local = {};
+    local.body = static_cast<std::uint32_t>(candidate.body);
+    local.generation = generations[candidate.body];
+    local.mass = body.mass_kg;
+    local.inertia = {body.inertia(0, 0), body.inertia(0, 1), body.inertia(0, 2),
+                     body.inertia(1, 1), body.inertia(1, 2), body.inertia(2, 2)};
+    local.position = ToArray(state.pose.position);
+    local.orientation = ToArray(state.pose.orientation);
+    local.velocity = ToArray(state.velocity);
+    local.angular_velocity = ToArray(state.angular_velocity);
+    local.acceleration = ToArray(scene.gravity);
+    for (const ContactSite& site : candidate.sites) {
+      // A contact of two copies stands with the one of the lower number.
+      if (site.other < candidate.body && search.Has(site.other)) continue;
+      local.contacts[local.contact_count++] = ToPlane(site, generations);
+    }
+  }
+  return count;
+}
+
+}  // namespace rikiseki::world
