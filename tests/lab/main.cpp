@@ -11,6 +11,7 @@
 #include "tests/lab/fig6.h"
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
+#include "tests/lab/pushes.h"
 #include "tests/lab/study.h"
 #include "tests/lab/wall.h"
 
@@ -19,7 +20,7 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6(), Planes(), Wall(), MultirateMasses(), MultirateGrowth()};
+  return {Fig6(), Planes(), Pushes(), Wall(), MultirateMasses(), MultirateGrowth()};
 }
 
 struct Options {
@@ -47,7 +48,7 @@ void PrintHelp(const po::options_description& description) {
     std::cout << "  " << known.name << "  " << known.purpose << "\n";
   std::cout << "\n"
             << description
-            << "\nExit status: 0; 1 if an expected result was missed; 64 for a wrong "
+            << "\nExit status: 0; 1 if an expected result or a bar was missed; 64 for a wrong "
             << "command line; 78 for a\nwrong table.\n";
 }
 
@@ -128,7 +129,11 @@ int Run(int argc, char** argv) {
     report << " " << result.Count(status) << " " << StatusName(status);
   }
   report << "\n";
-  return result.Count(RowStatus::kMissed) == 0 ? kExitOk : kExitFault;
+  // Rows of a table answer for what they expect, those of the own grid for each other.
+  const bool judged = options.cases.empty() && study->judge;
+  const std::size_t bars_missed =
+      judged ? study->judge(result.rows, result.outcomes, report) : std::size_t{0};
+  return result.Count(RowStatus::kMissed) + bars_missed == 0 ? kExitOk : kExitFault;
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include "common/clock.h"
 #include "haptic_server/device/hand.h"
 #include "haptic_server/render/contact_solve.h"
+#include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/surface_force.h"
 #include "tests/lab/wall_run.h"
 
