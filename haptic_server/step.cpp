@@ -192,7 +192,7 @@ void HapticStep::State::Release() noexcept {
 
 // Contact solve and surface force at the last sound sample. Movable bodies without a channel are
 // left out.
-// // RT:
+// RT:
 std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
                                                      bool& no_channel) noexcept {
   const std::span<const Surface> surfaces = track.Surfaces(copies);

@@ -11,6 +11,7 @@
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/local_bodies.h"
+#include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 #include "protocol/messages.h"
 
@@ -25,22 +26,6 @@ inline constexpr double kRecoveryTime = 0.1;
 
 /// Coordinates beyond this [m] are taken for damage, not for places.
 inline constexpr double kLargestCoordinate = 1e12;
-
-/// A plane as it is displayed in one tick.
-struct Surface {
-  std::uint32_t pointer = 0;
-  std::uint32_t body = 0;
-  std::uint32_t generation = 0;
-  std::uint32_t feature = 0;
-  Vec3 velocity = Vec3::Zero();  // m/s, of the body's material at the contact; not of the plane
-  double stiffness = 0;          // N/m; 0 = it brings none of its own
-  double damping = 0;            // N s/m, used only where stiffness > 0
-  double static_friction = 0;    // of the finger, Coulomb
-  double dynamic_friction = 0;   // likewise
-  double strength = 1;           // 0..1, of its stiffness and damping: a vanished one fades
-  bool fixed = false;            // the world says that the body cannot move
-  HalfSpace plane;               // unit normal
-};
 
 /// Where a finger is when a frame arrives: decides which new features need recovery.
 struct FingerState {

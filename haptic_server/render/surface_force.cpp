@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "haptic_server/render/feature_track.h"
-
 namespace rikiseki::haptic {
 
 SurfaceForce::SurfaceForce(const RenderSettings& settings, double period_s)

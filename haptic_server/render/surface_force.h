@@ -10,25 +10,12 @@
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/friction.h"
+#include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
 
-/// What one body does to the finger in this tick.
-struct BodyShare {
-  std::uint32_t body = 0;
-  std::uint32_t generation = 0;
-  Vec3 force = Vec3::Zero();         // N, on the user
-  Vec3 point = Vec3::Zero();         // m, where the opposite impulse acts on the body: D - r n
-  bool fixed = false;                // the body cannot move: its share belongs to the ground
-  Vec3 displacement = Vec3::Zero();  // m, e_b
-  double stiffness = 0;              // N/m, and damping, N s/m, that made the force
-  double damping = 0;
-};
-
 inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
-
-struct Surface;
 
 /// The contact law of one pointer. For body b with e_b = sum of its multiplier_i * normal_i, so
 /// that the e_b add up to e = D - C:  f_b = sum of k_i multiplier_i normal_i + d_b (e_b - e_b of
