@@ -47,6 +47,18 @@ bool IsSound(const DeviceSample& sample) {
          sample.position.cwiseAbs().maxCoeff() <= kLargestCoordinate;
 }
 
+Vec3 Sum(std::span<const BodyShare> shares) {
+  Vec3 sum = Vec3::Zero();
+  for (const BodyShare& share : shares) sum += share.force;
+  return sum;
+}
+
+// How much of `whole` is left in `part`, 0..1.
+double Fraction(const Vec3& part, const Vec3& whole) {
+  const double square = whole.squaredNorm();
+  return square > 0 && std::isfinite(square) ? std::clamp(part.dot(whole) / square, 0.0, 1.0) : 0;
+}
+
 // Denormal numbers mean nothing in metres and cost a slow path in the processor.
 void FlushDenormals(Vec3& v) {
   for (double& x : v) {
@@ -106,6 +118,7 @@ struct HapticStep::State {
   DeviceSample sample;             // the last sound one, in W
   double penetration = 0;          // m, |e| of the tick before
   double surface_work = 0;         // J, since then
+  double stored = 0;               // J, in the rendered springs
   std::uint64_t newest_epoch = 0;  // of the newest sound frame, and its number
   std::uint64_t newest_frame = 0;
   std::uint64_t shown_epoch = 0;  // whose surfaces are in the track; 0 = none
@@ -188,11 +201,12 @@ void HapticStep::State::Release() noexcept {
   surface_motion.Reset();
   penetration = 0;
   surface_work = 0;
+  stored = 0;
 }
 
 // Contact solve and surface force at the last sound sample. Movable bodies without a channel are
 // left out.
-// // RT:
+// RT:
 std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
                                                      bool& no_channel) noexcept {
   const std::span<const Surface> surfaces = track.Surfaces(copies);
@@ -211,7 +225,11 @@ std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
       no_channel = true;
     }
   }
+  const Vec3 as_sprung = Sum(std::span(shares).first(count));
   copies.SolveStiff(std::span(shares).first(count));
+  // What was solved together with its copy holds as much less: f^2/2k.
+  const double left = Fraction(Sum(std::span(shares).first(count)), as_sprung);
+  stored = left * left * surface_force.stored();
   return std::span(shares).first(count);
 }
 
@@ -297,7 +315,7 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   if (input.sample_finite && !input.stopped && !input.clutched &&
       (peer == PeerState::kLive || peer == PeerState::kLate || peer == PeerState::kLost)) {
     shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
-    for (const BodyShare& share : shares) wanted += share.force;
+    wanted = Sum(shares);
   } else {
     state.Release();
   }
@@ -307,7 +325,7 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
                           .velocity = measured.velocity,
                           .duration_s = Seconds(time.previous_duration_ns),
                           .surface_work = energy_scale * state.surface_work,
-                          .stored = energy_scale * state.surface_force.stored(),
+                          .stored = energy_scale * state.stored,
                           .penetration = state.penetration});
     input.velocity = measured.velocity;
     if (state.settings.safety.passivity_controller) input.brake = state.energy.Brake();

@@ -174,9 +174,16 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
       feature.strength = 1;
     }
   }
+  const auto arrivals = std::span(incoming_).first(count);
   for (std::size_t before = 0; before < count_ && count < incoming_.size(); ++before) {
     const Feature& known = features_[before];
-    if (paired[before] || known.identity.pointer >= fingers.size() ||
+    // Where a body's number got another meaning, the new body is there instead of the old.
+    const bool replaced =
+        std::any_of(arrivals.begin(), arrivals.end(), [&](const Feature& arrival) {
+          return arrival.identity.body == known.identity.body &&
+                 arrival.identity.generation != known.identity.generation;
+        });
+    if (paired[before] || replaced || known.identity.pointer >= fingers.size() ||
         !IsPressed(known, fingers[known.identity.pointer])) {
       continue;
     }

@@ -19,7 +19,8 @@ namespace rikiseki::haptic {
 
 /// A feature that appears with the finger already inside it starts below the finger and rises to
 /// its place within this time [s], so that the force does not step (Mark 1996: recovery time). One
-/// that vanishes while it is pressed stays where it is, and its force fades within the same time.
+/// that vanishes while it is pressed stays where it is, and its force fades within the same time,
+/// unless its body was replaced by another generation.
 /// A plane may bring a time of its own.
 inline constexpr double kRecoveryTime = 0.1;
 

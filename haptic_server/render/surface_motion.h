@@ -9,7 +9,7 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
-#include "haptic_server/render/feature_track.h"
+#include "haptic_server/render/surface.h"
 
 namespace rikiseki::haptic {
 

@@ -233,6 +233,17 @@ TEST_CASE("a surface that comes back while it fades grows strong again without a
   REQUIRE(track.Has(3, 1, 0));
 }
 
+TEST_CASE("a body of another generation takes the place of the old one at once") {
+  FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+  protocol::Plane plane = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0, 0), 0.01, 1}};
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  ++plane.generation;
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[0].generation == plane.generation);
+}
+
 TEST_CASE("a fading surface gives way to those of the frame when there is no room") {
   FeatureTrack track(DisplayRule::kHold, kPeriodNs);
   const std::array<FingerState, 1> finger = {FingerState{Vec3::Zero(), 0.01, 1}};
