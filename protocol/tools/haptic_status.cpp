@@ -127,11 +127,20 @@ void PrintHaptic(const Json& haptic) {
             << haptic["peer"]["epoch"] << ", newest frame "
             << Number(haptic["peer"]["feature_age_ms"], 1) << " ms old\n";
   PrintEnergy(haptic["energy"]);
+  PrintCopies(haptic["reconciliation"]);
   PrintLoop(haptic);
   std::cout << "  faults     " << haptic["page_faults"]["minor"] << " minor, "
             << haptic["page_faults"]["major"] << " major; largest force "
             << Number(haptic["largest_force_n"], 3) << " N, largest step "
             << Number(haptic["largest_force_step_n"], 4) << " N\n";
+}
+
+// Local bodies; a jump beyond a millimetre says that the copies do not know something.
+void PrintCopies(const Json& reconciliation) {
+  if (reconciliation["frames"] == 0) return;
+  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
+            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
+            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
 }
 
 void PrintBooks(const Json& books) {
