@@ -56,7 +56,7 @@
 
 #define RK_VERSION_MAJOR 0
 #define RK_VERSION_MINOR 3
-#define RK_LAYOUT_HASH UINT64_C(0x60453468F9F4924F) /* 8.3 */
+#define RK_LAYOUT_HASH UINT64_C(0x2C03F6A567697CB9) /* 8.3 */
 
 #define RK_MAGIC UINT64_C(0x494B4553494B4952) /* "RIKISEKI" */
 #define RK_BYTE_ORDER UINT32_C(0x01020304)
@@ -109,7 +109,10 @@ enum rk_reason { /* 6.6 */
                  RK_NO_CHANNEL = 11,
                  RK_DEVICE_FAULT = 12,
                  RK_LOOP_FAULT = 13,
-                 RK_STOPPED = 14
+                 RK_STOPPED = 14,
+                 RK_EMERGENCY_STOP = 15,
+                 RK_PASSIVITY = 16,
+                 RK_CLUTCHED = 17
 };
 
 /* Block bits. */
@@ -122,6 +125,7 @@ enum rk_reason { /* 6.6 */
 #define RK_FRAME_LOCAL_BODIES 16u
 #define RK_FRAME_MOBILITY 32u
 #define RK_HEALTH_RECONCILIATION 1u
+#define RK_HEALTH_ENERGY 2u
 #define RK_SCENE_MESHES 1u
 
 /* ---------------------------------------------------------------------------------------------
@@ -349,6 +353,14 @@ typedef struct rk_reconciliation { /* haptic.health/reconciliation */
   double largest_jump;
 } rk_reconciliation;
 
+typedef struct rk_energy { /* haptic.health/energy */
+  double injected;
+  double dissipated;
+  uint64_t flagged;
+  uint32_t unstable;
+  uint32_t controller;
+} rk_energy;
+
 typedef struct rk_discarded {
   int64_t gap[3];
   int64_t coupling[3];
@@ -483,6 +495,7 @@ RK_AT(rk_contact_plane, impulse, 104);
 RK_AT(rk_contact_plane, radius, 128);
 RK_SIZE(rk_plane_mobility, 8);
 RK_SIZE(rk_reconciliation, 24);
+RK_SIZE(rk_energy, 32);
 RK_SIZE(rk_scene_head, 120);
 RK_SIZE(rk_scene_body, 80);
 RK_SIZE(rk_scene_collider, 120);
@@ -527,7 +540,8 @@ typedef struct rk_frame {
               RK_MAX_LOCAL_BODIES *                                                     \
                   (sizeof(rk_local_body) + RK_MAX_CONTACT_PLANES * sizeof(rk_contact_plane))))
 #define RK_FRAME_ROOM (16384u - 32u) /* 6.2-2: what a frame's slot should have room for */
-#define RK_HAPTIC_HEALTH_BYTES ((uint32_t)(sizeof(rk_haptic_health) + sizeof(rk_reconciliation)))
+#define RK_HAPTIC_HEALTH_BYTES \
+  ((uint32_t)(sizeof(rk_haptic_health) + sizeof(rk_reconciliation) + sizeof(rk_energy)))
 
 /* What stands beside a payload. */
 typedef struct rk_received {
@@ -612,7 +626,7 @@ static inline enum rk_verdict rk_check_tick(rk_tick* m) {
     double norm;
     if (p->pointer >= RK_MAX_POINTERS || (seen & (1u << p->pointer)) != 0) return RK_BAD_IDENTITY;
     seen |= 1u << p->pointer;
-    if (p->reason > RK_STOPPED) return RK_BAD_ENUMERATOR;
+    if (p->reason > RK_CLUTCHED) return RK_BAD_ENUMERATOR;
     if (!rk_finite(&p->radius, 1) || !rk_finite(p->position, 3) || !rk_finite(p->velocity, 3) ||
         !rk_finite(p->force, 3) || !rk_finite(r->orientation, 4) ||
         !rk_finite(r->angular_velocity, 3) || !rk_finite(r->torque, 3)) {
@@ -1478,7 +1492,7 @@ static inline int rk_supersede(rk_segment* own, uint64_t* epoch) {
 }
 
 static inline uint16_t rk_type_version(uint32_t type_id) { /* 6 */
-  return type_id == RK_WORLD_FRAME ? 3 : type_id == RK_HAPTIC_HEALTH ? 2 : 1;
+  return type_id == RK_WORLD_FRAME || type_id == RK_HAPTIC_HEALTH ? 3 : 1;
 }
 
 /* Fills the private directory; the size of the whole segment, 0 if the streams cannot be. */

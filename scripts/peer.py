@@ -35,7 +35,7 @@ import threading
 import time
 
 VERSION = (0, 3)
-LAYOUT_HASH = 0x60453468F9F4924F  # 8.3
+LAYOUT_HASH = 0x2C03F6A567697CB9  # 8.3
 MAGIC = int.from_bytes(b"RIKISEKI", "little")
 BYTE_ORDER = 0x01020304
 HEADER_BYTES = 4096
@@ -148,6 +148,7 @@ WORLD_HEALTH = Record(
     "discarded.unknown_body:i64[3] penalty_impulse:f64[3] moving_bodies:u64 resets:u64 " + SCHEDULING +
     "scene:char[64] lateness:u64[256] duration:u64[256]")
 RECONCILIATION = Record("haptic.health/reconciliation", "frames:u64 newest_jump:f64 largest_jump:f64")
+ENERGY = Record("haptic.health/energy", "injected:f64 dissipated:f64 flagged:u64 unstable:u32 controller:u32")
 VELOCITY = Record("world.frame/plane_velocity", "velocity:f64[3]")
 FRICTION = Record("world.frame/plane_friction", "static_friction:f64 dynamic_friction:f64")
 RECOVERY = Record("world.frame/plane_recovery", "recovery_s:f64")
@@ -321,7 +322,7 @@ def check_tick(m):
     numbers = [p["pointer"] for p in m["pointers"]]
     demand(all(n < 4 for n in numbers) and len(set(numbers)) == len(numbers), "pointer numbers")
     for p in m["pointers"]:
-        demand(p["reason"] <= 14, "reason")
+        demand(p["reason"] <= 17, "reason")
         demand(p["radius"] >= 0, "radius")
     for r in m["rotations"]:
         normalise(r["orientation"], 0.99 - 1e-16, 1.01 + 1e-16, "no unit quaternion")
@@ -375,10 +376,13 @@ def check_inertia(inertia):
 
 
 def check_haptic_health(m):
-    demand(m["reason"] <= 14 and m["peer_state"] <= 5, "enumerator")
+    demand(m["reason"] <= 17 and m["peer_state"] <= 5, "enumerator")
     demand(is_period(m["period_ns"]), "no period")
     for r in m["reconciliation"]:
         demand(r["newest_jump"] >= 0 and r["largest_jump"] >= 0, "a negative jump")
+    for e in m["energy"]:
+        demand(e["dissipated"] >= 0, "negative friction")
+        demand(e["unstable"] <= 1 and e["controller"] <= 1, "enumerator")
 
 
 def check_world_health(m):
@@ -422,6 +426,7 @@ NOT_MOVING, SMOOTH, OWN_RECOVERY = {"velocity": [0.0] * 3}, {"static_friction": 
     {"recovery_s": 0.0}
 NOT_SAID = {"inverse_mass": -1.0}
 NO_JUMPS = {"frames": 0, "newest_jump": 0.0, "largest_jump": 0.0}
+NO_ENERGY = {"injected": 0.0, "dissipated": 0.0, "flagged": 0, "unstable": 0, "controller": 0}
 NO_FILE = {"sha256": [0] * 32, "path": bytes(224)}
 
 HAPTIC_TICK = Message(1, TICK, [("pointers", "pointer_count", POINTER, 4),
@@ -435,8 +440,9 @@ WORLD_FRAME = Message(16, FRAME, [("planes", "plane_count", PLANE, 32)],
                        Block(8, "recoveries", "plane_count", RECOVERY, OWN_RECOVERY, 32),
                        LocalBlock(),
                        Block(32, "mobilities", "plane_count", MOBILITY, NOT_SAID, 32)], check_frame, version=3)
-HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, (), [Block(1, "reconciliation", None, RECONCILIATION, NO_JUMPS)],
-                                check_haptic_health, version=2)
+HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, (), [Block(1, "reconciliation", None, RECONCILIATION, NO_JUMPS),
+                                                       Block(2, "energy", None, ENERGY, NO_ENERGY)],
+                                check_haptic_health, version=3)
 WORLD_HEALTH_MESSAGE = Message(17, WORLD_HEALTH, check=check_world_health)
 WORLD_BODIES = Message(18, BODIES, [("bodies", "body_count", BODY, 10000)], check=check_bodies)
 WORLD_SCENE = Message(19, SCENE, [("bodies", "body_count", SCENE_BODY, 10000),

@@ -87,6 +87,19 @@ void PrintLoop(const Json& side) {
             << "  work       " << Durations(side["duration_us"]) << "\n";
 }
 
+void PrintEnergy(const Json& energy) {
+  const double injected_mj = energy["injected_j"].get<double>() * 1e3;
+  std::cout << "  energy     the rendering has " << (injected_mj > 0 ? "given " : "absorbed ")
+            << Number(std::abs(injected_mj), 3) << " mJ, the device dissipated "
+            << Number(energy["dissipated_j"].get<double>() * 1e3, 3) << " mJ"
+            << (energy["controller_acts"].get<bool>() ? "; the passivity controller brakes" : "")
+            << "\n  contact    "
+            << (energy["unstable"].get<bool>()
+                    ? "UNSTABLE: it gives more energy than the device can dissipate"
+                    : "no sign of instability")
+            << ", flagged " << energy["times_flagged"] << " times since the start\n";
+}
+
 void PrintHaptic(const Json& haptic) {
   if (!haptic["attached"].get<bool>()) {
     std::cout << "HAPTIC  not there: " << haptic["why"].get<std::string>() << "\n";
@@ -113,11 +126,21 @@ void PrintHaptic(const Json& haptic) {
             << "  world      " << haptic["peer"]["state"].get<std::string>() << ", epoch "
             << haptic["peer"]["epoch"] << ", newest frame "
             << Number(haptic["peer"]["feature_age_ms"], 1) << " ms old\n";
+  PrintEnergy(haptic["energy"]);
+  PrintCopies(haptic["reconciliation"]);
   PrintLoop(haptic);
   std::cout << "  faults     " << haptic["page_faults"]["minor"] << " minor, "
             << haptic["page_faults"]["major"] << " major; largest force "
             << Number(haptic["largest_force_n"], 3) << " N, largest step "
             << Number(haptic["largest_force_step_n"], 4) << " N\n";
+}
+
+// Local bodies; a jump beyond a millimetre says that the copies do not know something.
+void PrintCopies(const Json& reconciliation) {
+  if (reconciliation["frames"] == 0) return;
+  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
+            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
+            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
 }
 
 void PrintBooks(const Json& books) {

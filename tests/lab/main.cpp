@@ -9,14 +9,18 @@
 #include "common/daemon.h"
 #include "common/exit_code.h"
 #include "tests/lab/fig6.h"
+#include "tests/lab/multirate.h"
+#include "tests/lab/planes.h"
+#include "tests/lab/pushes.h"
 #include "tests/lab/study.h"
+#include "tests/lab/wall.h"
 
 namespace rikiseki::lab {
 namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6()};
+  return {Fig6(), Planes(), Pushes(), Wall(), MultirateMasses(), MultirateGrowth()};
 }
 
 struct Options {
@@ -29,7 +33,11 @@ struct Options {
 
 std::string CaseNames() {
   std::string names;
-  for (const Case& known : Cases()) names += (names.empty() ? "" : ", ") + known.name;
+  std::string last;
+  for (const Case& known : Cases()) {
+    if (known.name != last) names += (names.empty() ? "" : ", ") + known.name;
+    last = known.name;
+  }
   return names;
 }
 
@@ -40,7 +48,7 @@ void PrintHelp(const po::options_description& description) {
     std::cout << "  " << known.name << "  " << known.purpose << "\n";
   std::cout << "\n"
             << description
-            << "\nExit status: 0; 1 if an expected result was missed; 64 for a wrong "
+            << "\nExit status: 0; 1 if an expected result or a bar was missed; 64 for a wrong "
             << "command line; 78 for a\nwrong table.\n";
 }
 
@@ -83,9 +91,8 @@ Options Parse(int argc, char** argv) {
 int Run(int argc, char** argv) {
   const Options options = Parse(argc, argv);
   const std::vector<Case> cases = Cases();
-  const auto study = std::find_if(cases.begin(), cases.end(), [&](const Case& known) {
-    return known.name == options.case_name;
-  });
+  const auto named = [&](const Case& known) { return known.name == options.case_name; };
+  auto study = std::find_if(cases.begin(), cases.end(), named);
   if (study == cases.end()) {
     const std::string complaint =
         options.case_name.empty() ? "a case is required" : "there is no case " + options.case_name;
@@ -93,6 +100,12 @@ int Run(int argc, char** argv) {
   }
   const Table table =
       options.cases.empty() ? study->grid(options.quick) : Table::Load(options.cases);
+  study = std::find_if(study, cases.end(), [&](const Case& known) {
+    return named(known) && (!known.takes || known.takes(table));
+  });
+  if (study == cases.end()) {
+    throw ConfigError(table.name() + ": the columns are of no row format of " + options.case_name);
+  }
   // Tried before the work, which may be long; what the file holds is kept until there is something
   // new.
   if (!options.out.empty() && !std::ofstream(options.out, std::ios::app)) {
@@ -116,7 +129,11 @@ int Run(int argc, char** argv) {
     report << " " << result.Count(status) << " " << StatusName(status);
   }
   report << "\n";
-  return result.Count(RowStatus::kMissed) == 0 ? kExitOk : kExitFault;
+  // Rows of a table answer for what they expect, those of the own grid for each other.
+  const bool judged = options.cases.empty() && study->judge;
+  const std::size_t bars_missed =
+      judged ? study->judge(result.rows, result.outcomes, report) : std::size_t{0};
+  return result.Count(RowStatus::kMissed) + bars_missed == 0 ? kExitOk : kExitFault;
 }
 
 }  // namespace

@@ -96,7 +96,8 @@ void TickWatch::Run() {
       const double step =
           std::hypot(force[0] - before[0], force[1] - before[1], force[2] - before[2]);
       const double allowed = slew_limit_ * static_cast<double>(tick.period_ns) * 1e-9;
-      worst_over_slew_ = std::max(worst_over_slew_.load(), step - allowed);
+      const bool stopped = tick.pointers[0].reason == protocol::ForceReason::kEmergencyStop;
+      if (!stopped) worst_over_slew_ = std::max(worst_over_slew_.load(), step - allowed);
     }
     number_before = reader.received().number;
     before = force;

@@ -105,9 +105,13 @@ TEST_CASE("a message is as long as what it uses") {
   for (LocalBody& body : frame.local_bodies) body.contact_count = kMaxContactPlanes;
   CHECK(Encode(frame, words).used_bytes == kWorldFrameBytes);
   HapticHealth health;
-  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24);
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24 - 32);
   health.reconciliation.frames = 1;
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 32);
+  health.energy.injected = -1e-9;
   CHECK(Encode(health, words).used_bytes == kHapticHealthBytes);
+  health.reconciliation.frames = 0;
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24);
   WorldScene scene;
   CHECK(Encode(scene, words).used_bytes == 120);
   scene.bodies.resize(2);
@@ -252,7 +256,7 @@ TEST_CASE("a nonsensical tick is refused") {
           {"pointer huge", [](auto& m) { m.pointers[1].pointer = ~0u; }, S::kIdentity},
           {"pointer twice", [](auto& m) { m.pointers[1].pointer = m.pointers[0].pointer; },
            S::kIdentity},
-          {"reason 15", [](auto& m) { m.pointers[0].reason = static_cast<ForceReason>(15); },
+          {"reason 18", [](auto& m) { m.pointers[0].reason = static_cast<ForceReason>(18); },
            S::kEnumerator},
           {"radius", [](auto& m) { m.pointers[0].radius = kNaN; }, S::kNotFinite},
           {"radius < 0", [](auto& m) { m.pointers[0].radius = -1e-9; }, S::kRange},
@@ -548,7 +552,7 @@ TEST_CASE("nonsensical health is refused") {
   CheckRefused<HapticHealth>(
       Generator(7).Haptic(),
       {
-          {"reason", [](auto& m) { m.reason = static_cast<ForceReason>(15); }, S::kEnumerator},
+          {"reason", [](auto& m) { m.reason = static_cast<ForceReason>(18); }, S::kEnumerator},
           {"peer", [](auto& m) { m.peer_state = static_cast<PeerState>(6); }, S::kEnumerator},
           {"force", [](auto& m) { m.largest_force = kNaN; }, S::kNotFinite},
           {"step", [](auto& m) { m.largest_force_step = kNaN; }, S::kNotFinite},
@@ -564,6 +568,11 @@ TEST_CASE("nonsensical health is refused") {
              m.reconciliation = Reconciliation{1, 1, -1};
            },
            S::kRange},
+          {"injected", [](auto& m) { m.energy.injected = kNaN; }, S::kNotFinite},
+          {"dissipated", [](auto& m) { m.energy.dissipated = kInfinity; }, S::kNotFinite},
+          {"dissipated < 0", [](auto& m) { m.energy.dissipated = -1e-9; }, S::kRange},
+          {"unstable", [](auto& m) { m.energy.unstable = 2; }, S::kEnumerator},
+          {"controller", [](auto& m) { m.energy.controller = 2; }, S::kEnumerator},
           {"period", [](auto& m) { m.period_ns = 0; }, S::kRange},
       });
   CheckRefused<WorldHealth>(

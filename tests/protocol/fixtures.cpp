@@ -98,6 +98,7 @@ HapticHealth FixtureHapticHealth() {
   m.lateness = next.Counts();
   m.duration = next.Counts();
   m.reconciliation = {next.Big(), next.Real(), next.Real()};
+  m.energy = {next.Real(), next.Real(), next.Big(), 1, 1};
   return m;
 }
 

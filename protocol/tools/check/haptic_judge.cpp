@@ -145,7 +145,9 @@ void HapticJudge::Forces(const HapticTick& tick, bool consecutive) {
       return Num(Norm(TotalForce(tick))) + " N displayed without a world" + At(tick);
     });
   }
-  if (consecutive && slew_limit_ > 0) {
+  const bool stopped =
+      tick.pointer_count > 0 && tick.pointers[0].reason == ForceReason::kEmergencyStop;
+  if (consecutive && slew_limit_ > 0 && !stopped) {
     const double step = Norm(Difference(TotalForce(tick), TotalForce(newest_)));
     const double most = slew_limit_ * Seconds(tick.period_ns) * (1 + 1e-9) + kNoForce;
     monitor_.Judge(kSlew, step <= most, [&] {
