@@ -83,9 +83,6 @@ TEST_CASE("the gap follows the rate where it is not given") {
 }
 
 TEST_CASE("refusals name place, key, value and cure in one line") {
-  CHECK(Refusal({"coupling.coupling=local"}) ==
-        "--set coupling.coupling=local: coupling.coupling = local: this version has no local "
-        "dynamics; position and impulse exist");
   CHECK(Refusal({"loop.rate_hz=0"}) ==
         "--set loop.rate_hz=0: loop.rate_hz = 0: a number from 1 to 1000 is expected (the unit is "
         "part of the key's name)");
