@@ -59,6 +59,12 @@ struct Case {
   /// Prints what the rows say together.
   std::function<void(const Table& rows, const std::vector<Outcome>& outcomes, std::ostream& out)>
       summarise;
+
+  /// Holds the rows of the case's own grid against each other: names every bar that is missed and
+  /// returns how many are. May be absent.
+  std::function<std::size_t(const Table& rows, const std::vector<Outcome>& outcomes,
+                            std::ostream& out)>
+      judge;
 };
 
 struct StudyOptions {
