@@ -109,7 +109,8 @@ TEST_CASE("haptic_lab exits 1 where an expected result is missed, and only there
   const Ended missed = run("0.0859998056");  // 2e-9 off
   CHECK(missed.exit_code == 1);
   CHECK(Contains(missed.output, ",missed\n"));
-  const TemporaryFile local(kHeader + ",x_final_m\nn,P,EX,0.05,2000,0,0.5,local_M1_noreplay,0,0.5\n");
+  const TemporaryFile local(kHeader +
+                            ",x_final_m\nn,P,EX,0.05,2000,0,0.5,local_M1_noreplay,0,0.5\n");
   const Ended unsupported = Run("fig6 --cases " + local.path());
   CHECK(unsupported.exit_code == 0);
   CHECK(Contains(unsupported.output, ",0.5,,,,unsupported\n"));

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "tests/lab/multirate_loop.h"
+#include "tests/lab/stable_masses.h"
 
 namespace rikiseki::lab {
 namespace {
