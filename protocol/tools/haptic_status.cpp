@@ -87,6 +87,14 @@ void PrintLoop(const Json& side) {
             << "  work       " << Durations(side["duration_us"]) << "\n";
 }
 
+// Local bodies; a jump beyond a millimetre says that the copies do not know something.
+void PrintCopies(const Json& reconciliation) {
+  if (reconciliation["frames"] == 0) return;
+  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
+            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
+            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
+}
+
 void PrintEnergy(const Json& energy) {
   const double injected_mj = energy["injected_j"].get<double>() * 1e3;
   std::cout << "  energy     the rendering has " << (injected_mj > 0 ? "given " : "absorbed ")

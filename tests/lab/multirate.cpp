@@ -294,10 +294,6 @@ bool GrowthAgrees(const Row& row, const Outcome& outcome, std::size_t index) {
          (scored ? 0.01 + 0.02 * std::abs(rate) : 0.05 + 0.05 * std::abs(rate));
 }
 
-Table NoGrowthGrid(bool /*quick*/) {
-  return Table("no grid", {"m", "b", "kh", "kp", "kd", "T", "n", "M", "L"});
-}
-
 void SummariseGrowth(const Table& rows, const std::vector<Outcome>& outcomes, std::ostream& out) {
   out << "Of " << rows.size() << " random loops, those in which a deviation grows, and the median "
       << "growth per world period\n"
@@ -338,7 +334,6 @@ Case MultirateGrowth() {
   for (const std::string_view method : kLoopMethodNames)
     study.results.push_back({std::string(method)});
   study.takes = [](const Table& table) { return table.Has("n") && table.Has("M"); };
-  study.grid = NoGrowthGrid;
   study.run = RunGrowth;
   study.agrees = GrowthAgrees;
   study.summarise = SummariseGrowth;
