@@ -217,14 +217,35 @@ TEST_CASE("two bodies that collide keep their momentum and do not go on approach
     const Vec3 momentum_before = momentum();
     const Vec3 angular_before = angular();
     const double energy_before = energy();
+    const Vec3 velocity_before = bodies[0].state.velocity;
     const double approach_before = approach();
     SolveVelocities(bodies, contacts, {}, kStep);
     REQUIRE((momentum() - momentum_before).norm() < 1e-14 * (1 + momentum_before.norm()));
     REQUIRE((angular() - angular_before).norm() < 1e-14 * (1 + angular_before.norm()));
+    const Vec3 given = bodies[0].inertia.mass_kg * (bodies[0].state.velocity - velocity_before);
+    REQUIRE(given.dot(normal) == Approx(contacts[0].normal_impulse).epsilon(1e-9).margin(1e-15));
+    REQUIRE((given - given.dot(normal) * normal).norm() <=
+            contacts[0].friction * contacts[0].normal_impulse * (1 + 1e-9) + 1e-15);
     REQUIRE(energy() <= energy_before * (1 + 1e-12));
     REQUIRE(approach() > -1e-6);
     if (approach_before > 0) REQUIRE(contacts[0].normal_impulse == 0);
     if (approach_before < -1e-6) REQUIRE(contacts[0].normal_impulse > 0);
+  }
+}
+
+TEST_CASE("a body that is hit goes on with its new velocity at once, and the two stay together") {
+  std::array<StepBody, 2> bodies = {Cube(0.06, 0.5, 0), Cube(0.06, 1.5, 0)};
+  bodies[0].state.velocity = {1, 0, 0};
+  bodies[1].state.pose.position = {0.06, 0, 0};
+  std::vector<StepContact> contacts(1);
+  contacts[0].other = 1;
+  contacts[0].p_B = {0.03, 0, 0};
+  contacts[0].point = {-0.03, 0, 0};
+  contacts[0].normal = {-1, 0, 0};
+  for (int i = 1; i <= 100; ++i) {
+    StepBodies(bodies, contacts, kStep, PositionRule::kSecondOrder);
+    REQUIRE(bodies[0].state.pose.position.x() == Approx(0.25 * kStep * i).epsilon(1e-9));
+    REQUIRE(bodies[1].state.pose.position.x() == Approx(0.06 + 0.25 * kStep * i).epsilon(1e-9));
   }
 }
 

@@ -45,12 +45,13 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
   std::stringstream text;
   text << file.rdbuf();
   CHECK(KeysOf(text.str(), true) == KeysOf(description, false));
-  CHECK(KeysOf(text.str(), true).size() == 7);
+  CHECK(KeysOf(text.str(), true).size() == 8);
 
   const Settings defaults;
   CHECK(shipped.loop.rate_hz == defaults.loop.rate_hz);
   CHECK(shipped.physics.substep_ms == defaults.physics.substep_ms);
   CHECK(shipped.coupling.coupling == defaults.coupling.coupling);
+  CHECK(shipped.coupling.replay == defaults.coupling.replay);
   CHECK(shipped.coupling.force_cap_n == defaults.coupling.force_cap_n);
   CHECK(shipped.coupling.gap_ms == defaults.coupling.gap_ms);
   CHECK(shipped.features.radius_mm == defaults.features.radius_mm);
@@ -58,14 +59,15 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
 }
 
 TEST_CASE("every key reaches its setting") {
-  const Settings settings =
-      LoadSettings(kShipped, {"loop.rate_hz=50", "scene.file=/a/b.sdf", "physics.substep_ms=2",
-                              "coupling.coupling=position", "coupling.force_cap_n=7",
-                              "coupling.gap_ms=250", "features.radius_mm=33"});
+  const Settings settings = LoadSettings(
+      kShipped, {"loop.rate_hz=50", "scene.file=/a/b.sdf", "physics.substep_ms=2",
+                 "coupling.coupling=position", "coupling.replay=lump", "coupling.force_cap_n=7",
+                 "coupling.gap_ms=250", "features.radius_mm=33"});
   CHECK(settings.period_ns() == 20'000'000);
   CHECK(settings.scene.file == "/a/b.sdf");
   CHECK(settings.physics.substep_ms == 2);
   CHECK(settings.coupling.coupling == protocol::Coupling::kPosition);
+  CHECK(settings.coupling.replay == ReplayRule::kLump);
   CHECK(settings.coupling.force_cap_n == 7);
   CHECK(settings.gap_s() == 0.25);
   CHECK(settings.features.radius_mm == 33);
@@ -81,9 +83,6 @@ TEST_CASE("the gap follows the rate where it is not given") {
 }
 
 TEST_CASE("refusals name place, key, value and cure in one line") {
-  CHECK(Refusal({"coupling.coupling=local"}) ==
-        "--set coupling.coupling=local: coupling.coupling = local: this version has no local "
-        "dynamics; position and impulse exist");
   CHECK(Refusal({"loop.rate_hz=0"}) ==
         "--set loop.rate_hz=0: loop.rate_hz = 0: a number from 1 to 1000 is expected (the unit is "
         "part of the key's name)");
