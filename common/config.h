@@ -46,6 +46,7 @@ class ConfigSchema {
   void Choice(const std::string& key, Enum* target,
               const std::vector<std::pair<std::string, Enum>>& words, const std::string& doc) {
     std::vector<std::string> names;
+    names.reserve(words.size());
     for (const auto& [name, value] : words) names.push_back(name);
     AddChoice(
         key, names, [target, words](std::size_t index) { *target = words[index].second; },

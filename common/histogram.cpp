@@ -18,9 +18,9 @@ std::size_t HistogramBucket(std::int64_t duration_ns) noexcept {
   if (duration_ns < kFloorNs) return 0;
   if (duration_ns >= HistogramLowerEdge(kHistogramSize - 1)) return kHistogramSize - 1;
   const auto floors = static_cast<std::uint64_t>(duration_ns / kFloorNs);  // >= 1
-  const auto octave = std::max(static_cast<int>(std::bit_width(floors)), 1) - 1;
+  const auto octave = static_cast<std::int64_t>(std::bit_width(floors | 1)) - 1;
   const std::int64_t base = kFloorNs << octave;
-  const auto step = static_cast<int>((duration_ns - base) * kPerOctave / base);
+  const std::int64_t step = (duration_ns - base) * kPerOctave / base;
   return static_cast<std::size_t>(1 + octave * kPerOctave + step);
 }
 

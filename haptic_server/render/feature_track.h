@@ -11,28 +11,21 @@
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/local_bodies.h"
+#include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 #include "protocol/messages.h"
 
 namespace rikiseki::haptic {
 
 /// A feature that appears with the finger already inside it starts below the finger and rises to
-/// its place within this time [s], so that the force does not step (Mark 1996: recovery time).
+/// its place within this time [s], so that the force does not step (Mark 1996: recovery time). One
+/// that vanishes while it is pressed stays where it is, and its force fades within the same time,
+/// unless its body was replaced by another generation.
+/// A plane may bring a time of its own.
 inline constexpr double kRecoveryTime = 0.1;
 
 /// Coordinates beyond this [m] are taken for damage, not for places.
 inline constexpr double kLargestCoordinate = 1e12;
-
-/// A plane as it is displayed in one tick.
-struct Surface {
-  std::uint32_t pointer = 0;
-  std::uint32_t body = 0;
-  std::uint32_t generation = 0;
-  double stiffness = 0;  // N/m; 0 = it brings none of its own
-  double damping = 0;    // N s/m, used only where stiffness > 0
-  bool fixed = false;    // the world says that the body cannot move
-  HalfSpace plane;       // unit normal
-};
 
 /// Where a finger is when a frame arrives: decides which new features need recovery.
 struct FingerState {
@@ -71,11 +64,14 @@ class FeatureTrack {
     Vec3 previous_normal, last_normal;
     double recovery = 0;       // m, how far below its place it started
     double recovery_left = 0;  // 1..0
+    bool leaving = false;      // no longer in the frame
+    double strength = 1;
   };
 
   void FollowCopies(const LocalBodies& copies) noexcept;
   HalfSpace Interpolated(const Feature& feature) const noexcept;
   HalfSpace Displayed(const Feature& feature) const noexcept;
+  bool IsPressed(const Feature& feature, const FingerState& finger) const noexcept;
 
   DisplayRule rule_;
   std::int64_t period_ns_;

@@ -11,7 +11,7 @@
 
 #include "common/body_step.h"
 #include "common/geometry.h"
-#include "haptic_server/render/surface_force.h"
+#include "haptic_server/render/surface.h"
 #include "protocol/messages.h"
 
 namespace rikiseki::haptic {

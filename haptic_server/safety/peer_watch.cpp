@@ -70,13 +70,12 @@ PeerState PeerWatch::Update(std::int64_t now_ns, const PeerSign& sign,
       break;
     case PeerState::kLive:
     case PeerState::kLate:
-      if (!Alive(now_ns, sign)) {
+      if (!Alive(now_ns, sign) ||
+          (!sign.fresh_frame && age > LostAfter(safety_, world_period_ns_))) {
         state_ = PeerState::kLost;
       } else if (sign.fresh_frame) {
         NoteFrame(now_ns, sign);
         state_ = PeerState::kLive;
-      } else if (age > LostAfter(safety_, world_period_ns_)) {
-        state_ = PeerState::kLost;
       } else if (age > Periods(safety_.late_periods, world_period_ns_)) {
         state_ = PeerState::kLate;
       }

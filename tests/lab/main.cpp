@@ -1,15 +1,15 @@
 // haptic_lab: experiments in virtual time with the very step functions that the daemons ship.
 #include <algorithm>
-#include <boost/program_options.hpp>
 #include <charconv>
 #include <fstream>
 #include <iostream>
 #include <thread>
 
+#include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
-#include "common/version.h"
 #include "tests/lab/fig6.h"
+#include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/pushes.h"
 #include "tests/lab/study.h"
@@ -20,7 +20,7 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6(), Planes(), Pushes(), Wall()};
+  return {Fig6(), Planes(), Pushes(), Wall(), MultirateMasses(), MultirateGrowth()};
 }
 
 struct Options {
@@ -68,36 +68,19 @@ Options Parse(int argc, char** argv) {
   Options options;
   options.study.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::string shard = "1/1";
-  po::options_description visible("Options");
-  visible.add_options()("cases", po::value(&options.cases)->value_name("F.csv"),
-                        "rows to run; without it, the case's own grid")(
+  CommandLine line{.program = "haptic_lab", .visible = po::options_description("Options")};
+  line.visible.add_options()("cases", po::value(&options.cases)->value_name("F.csv"),
+                             "rows to run; without it, the case's own grid")(
       "out", po::value(&options.out)->value_name("F.csv"),
       "where the rows go, with got_... columns appended; without it, rows of --cases go to stdout")(
       "quick", po::bool_switch(&options.quick), "makes the case's own grid smaller")(
       "jobs", po::value(&options.study.jobs)->value_name("N"), "threads (default: one per core)")(
       "shard", po::value(&shard)->value_name("K/N"), "only every N-th row, from the K-th on")(
-      "seed", po::value(&options.study.seed)->value_name("S"), "of what a case draws at random")(
-      "version", "prints the version")("help", "prints this");
-  po::options_description all;
-  all.add(visible).add_options()("case", po::value(&options.case_name));
-  po::positional_options_description positional;
-  positional.add("case", 1);
-  po::variables_map values;
-  try {
-    po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(),
-              values);
-    po::notify(values);
-  } catch (const po::error& error) {
-    throw StartError(kExitUsage, std::string(error.what()) + "; try --help");
-  }
-  if (values.count("help") != 0) {
-    PrintHelp(visible);
-    std::exit(kExitOk);
-  }
-  if (values.count("version") != 0) {
-    std::cout << "haptic_lab " << kVersion << " (" << kBuild << ")\n";
-    std::exit(kExitOk);
-  }
+      "seed", po::value(&options.study.seed)->value_name("S"), "of what a case draws at random");
+  line.hidden.add_options()("case", po::value(&options.case_name));
+  line.positional.add("case", 1);
+  line.print_help = [&line] { PrintHelp(line.visible); };
+  ParseCommandLine(argc, argv, line);
   if (options.study.jobs < 1 || options.study.jobs > 1024) {
     throw StartError(kExitUsage, "--jobs: 1 to 1024 is expected");
   }

@@ -33,7 +33,8 @@ double Depth(const HalfSpace& plane, const Vec3& x) {
 }
 
 double TouchTolerance(const Vec3& finger, const ContactSolution& solution) {
-  return kTouch * std::max({1.0, finger.cwiseAbs().maxCoeff(), solution.proxy.cwiseAbs().maxCoeff()});
+  return kTouch *
+         std::max({1.0, finger.cwiseAbs().maxCoeff(), solution.proxy.cwiseAbs().maxCoeff()});
 }
 
 }  // namespace
@@ -142,10 +143,8 @@ Outcome RunRow(const Row& row, std::uint64_t /*seed*/) {
   // The solver takes no more: the haptic tick displays no more.
   if (task.planes.size() > haptic::kMaxContactPlanes) return {RowStatus::kUnsupported, {}};
   const ContactSolution solution = haptic::SolveContact(task.finger, 0, task.planes);
-  const auto pushing =
-      std::count_if(solution.multiplier.begin(), solution.multiplier.end(), [](double multiplier) {
-        return multiplier > 0;
-      });
+  const auto pushing = std::count_if(solution.multiplier.begin(), solution.multiplier.end(),
+                                     [](double multiplier) { return multiplier > 0; });
   return {RowStatus::kOk,
           {solution.feasible ? 1.0 : 0.0, solution.proxy.x(), solution.proxy.y(),
            solution.proxy.z(), solution.displacement.norm(), static_cast<double>(pushing),
@@ -172,7 +171,8 @@ bool Agrees(const Row& row, const Outcome& outcome, std::size_t index) {
       double rounding = 0;
       for (int i = 0; i < 3; ++i) {
         if (!row.Find(kAxes[i])) continue;
-        error[i] = outcome.values[kDx + static_cast<std::size_t>(i)] - ExpectedNumber(row, kAxes[i]);
+        error[i] =
+            outcome.values[kDx + static_cast<std::size_t>(i)] - ExpectedNumber(row, kAxes[i]);
         rounding += RoundingOf(row.Text(kAxes[i]));
       }
       return error.norm() <= DistanceTolerance(outcome) + rounding;
@@ -317,7 +317,8 @@ void Summarise(const Table& rows, const std::vector<Outcome>& outcomes, std::ost
          "normals that touch,\nworst distance from the conditions of an exact solution\n"
       << std::left << std::setw(30) << "category" << std::right << std::setw(6) << "rows"
       << std::setw(12) << "infeasible" << std::setw(9) << "pushing" << std::setw(13)
-      << "|D - C| [m]" << std::setw(11) << "condition" << std::setw(14) << "residual [m]" << "\n";
+      << "|D - C| [m]" << std::setw(11) << "condition" << std::setw(14) << "residual [m]"
+      << "\n";
   for (const Group& group : groups) {
     out << std::left << std::setw(30) << group.category << std::right << std::setw(6) << group.rows
         << std::setw(12) << group.infeasible << std::setw(9) << std::fixed << std::setprecision(2)
@@ -334,7 +335,7 @@ Case Planes() {
   Case study;
   study.name = "planes";
   study.purpose = "the nearest point outside a set of planes (nothing random but the grid)";
-  study.results = {{"feasible"}, {"Dx"},         {"Dy"},        {"Dz"},
+  study.results = {{"feasible"}, {"Dx"},       {"Dy"},         {"Dz"},
                    {"dist"},     {"n_active"}, {"residual_m"}, {"condition"}};
   study.grid = Grid;
   study.run = RunRow;

@@ -145,9 +145,9 @@ void WriteStudy(const Case& study, const StudyResult& result, std::ostream& out)
     for (std::size_t i = 0; i < study.results.size(); ++i) {
       const std::size_t values = outcome.values.size();
       const std::size_t text = i - values;  // read only where i >= values
-      fields.push_back(i < values                     ? ToField(outcome.values[i])
+      fields.push_back(i < values                    ? ToField(outcome.values[i])
                        : text < outcome.texts.size() ? outcome.texts[text]
-                                                      : "");
+                                                     : "");
     }
     fields.emplace_back(StatusName(outcome.status));
     extra.push_back(std::move(fields));

@@ -17,7 +17,7 @@
 namespace rikiseki::lab {
 namespace {
 
-constexpr double kDepth = 0.01;         // m, of the steady contact
+constexpr double kDepth = 0.01;           // m, of the steady contact
 constexpr double kSimulatedKappa = 1e-3;  // numerics section 6: below, growth is too slow to tell
 constexpr double kMargin = 0.03;          // of K_max, on both sides
 
@@ -163,9 +163,7 @@ Outcome RunRow(const Row& row, std::uint64_t /*seed*/) {
                            !StaysInContact(loop, (1 + kMargin) * largest);
     verdict.push_back(bracketed ? '1' : '0');
   }
-  return {RowStatus::kOk,
-          {largest, LinearRule(loop), PassivityBound(loop), kappa},
-          {verdict}};
+  return {RowStatus::kOk, {largest, LinearRule(loop), PassivityBound(loop), kappa}, {verdict}};
 }
 
 // Stiffnesses come from different methods: to 1e-4 of them. That no stiffness is stable may be
@@ -189,9 +187,11 @@ Table Grid(bool quick) {
     double damping_ns_per_m;
   };
   // The device alone, and with a light, a medium and a firm hand.
-  const std::vector<Held> devices = quick ? std::vector<Held>{{0.03, 0.2}, {0.58, 6.7}}
-                                          : std::vector<Held>{{0.03, 0.2}, {0.13, 2.2}, {0.58, 6.7}, {0.93, 15.2}};
-  const std::vector<double> dampings = quick ? std::vector{0.0, 2.0} : std::vector{0.0, 1.0, 2.0, 5.0, 10.0, 20.0};
+  const std::vector<Held> devices =
+      quick ? std::vector<Held>{{0.03, 0.2}, {0.58, 6.7}}
+            : std::vector<Held>{{0.03, 0.2}, {0.13, 2.2}, {0.58, 6.7}, {0.93, 15.2}};
+  const std::vector<double> dampings =
+      quick ? std::vector{0.0, 2.0} : std::vector{0.0, 1.0, 2.0, 5.0, 10.0, 20.0};
   for (const Held& held : devices) {
     for (const double period_s : periods) {
       for (const double damping : dampings) {
@@ -233,7 +233,11 @@ void Summarise(const Table& rows, const std::vector<Outcome>& outcomes, std::ost
     part(got[kPassive]);
     const std::string& simulated = outcomes[i].texts[0];
     out << std::setw(13)
-        << (got[kLargest] == 0 ? "-" : simulated.empty() ? "too slow" : simulated == "1" ? "+-3 %" : "OTHERWISE") << "\n";
+        << (got[kLargest] == 0  ? "-"
+            : simulated.empty() ? "too slow"
+            : simulated == "1"  ? "+-3 %"
+                                : "OTHERWISE")
+        << "\n";
   }
   out << std::defaultfloat;
 }

@@ -9,11 +9,11 @@ namespace rikiseki::lab {
 /// A device without a hand against a wall: m x'' + b x' = f, held from tick to tick, with
 /// f_k = -(K x_(k-d) + B (x_(k-d) - x_(k-d-1))/T) while in contact.
 struct WallLoop {
-  double period_s = 1e-3;                // T
-  double mass_kg = 0.03;                 // m
-  double damping_ns_per_m = 0.2;         // b, of the device
-  double wall_damping_ns_per_m = 0;      // B
-  int delay_samples = 0;                 // d
+  double period_s = 1e-3;            // T
+  double mass_kg = 0.03;             // m
+  double damping_ns_per_m = 0.2;     // b, of the device
+  double wall_damping_ns_per_m = 0;  // B
+  int delay_samples = 0;             // d
 };
 
 /// Growth per tick of what deviates from a steady contact: the spectral radius of the loop's

@@ -11,10 +11,12 @@
 namespace rikiseki::lab {
 namespace {
 
-constexpr double kUnlimited = 1e9;  // for limits that must not act: N, N/s, m/s, mm
+constexpr double kUnlimited = 1e9;     // for limits that must not act: N, N/s, m/s, mm
 constexpr double kWorldPeriod = 0.02;  // s: a wall that stands still needs no more
 
-std::int64_t PeriodNs(const WallSurface& wall) { return std::llround(wall.period_s * 1e9); }
+std::int64_t PeriodNs(const WallSurface& wall) {
+  return std::llround(wall.period_s * 1e9);
+}
 
 world::Settings WorldSettings(const WallSurface& wall) {
   const double period_s = Seconds(PeriodNs(wall));
@@ -38,8 +40,8 @@ world::Scene WallScene() {
 }
 
 std::unique_ptr<world::DynamicsWorld> Dynamics(const WallSurface& wall) {
-  return std::make_unique<world::BulletWorld>(
-      WallScene(), Seconds(WorldSettings(wall).period_ns()));
+  return std::make_unique<world::BulletWorld>(WallScene(),
+                                              Seconds(WorldSettings(wall).period_ns()));
 }
 
 }  // namespace
@@ -88,7 +90,8 @@ haptic::DeviceStatus PressedDevice::Read(std::int64_t now_ns,
   }
   now_ns_ = now_ns;
   positions_[reads_ % positions_.size()] = position_;
-  const std::size_t late = reads_ + positions_.size() - static_cast<std::size_t>(setup_.delay_samples);
+  const std::size_t late =
+      reads_ + positions_.size() - static_cast<std::size_t>(setup_.delay_samples);
   sample = {};
   sample.position.x() = sample.target.x() = positions_[late % positions_.size()];
   ++reads_;

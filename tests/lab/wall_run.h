@@ -64,7 +64,7 @@ class PressedDevice final : public haptic::Device {
   haptic::ImpedanceStep step_;
   double position_ = 0;
   double velocity_ = 0;
-  double force_ = 0;                                    // N, of the display, on the user
+  double force_ = 0;  // N, of the display, on the user
   std::size_t reads_ = 0;
   std::array<double, kLongestDelay + 1> positions_{};  // of the last reads, at their number modulo
 };

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <vector>
 
 namespace rikiseki::haptic {
 namespace {
@@ -26,6 +27,7 @@ protocol::WorldFrame Frame(const std::vector<protocol::Plane>& planes,
   return frame;
 }
 
+const LocalBodies kNoCopies(kPeriodNs, 16, 0, PositionRule::kSecondOrder);
 const std::array<FingerState, 1> kFarFinger = {FingerState{Vec3(0, 10, 0), 0, 0}};
 
 bool SameBits(const Vec3& a, const Vec3& b) {
@@ -39,16 +41,16 @@ const Vec3 kNormal1 = Vec3(-0.2, 0.8, 0.5).normalized();
 
 TEST_CASE("interpolation shows prev at j = 0 and last at j = n, bit for bit, and stops there") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
-  track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger);
-  REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint0));
-  REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal0));
+  track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger, kNoCopies);
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.point, kPoint0));
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.normal, kNormal0));
   track.Advance(50);
-  track.Receive(Frame({PlaneAt(1, kPoint1, kNormal1)}), kFarFinger);
-  REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint0));
-  REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal0));
+  track.Receive(Frame({PlaneAt(1, kPoint1, kNormal1)}), kFarFinger, kNoCopies);
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.point, kPoint0));
+  REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.normal, kNormal0));
   for (int j = 1; j < 50; ++j) {
     track.Advance(1);
-    const HalfSpace shown = track.Surfaces()[0].plane;
+    const HalfSpace shown = track.Surfaces(kNoCopies)[0].plane;
     REQUIRE((shown.point - (kPoint0 + j / 50.0 * (kPoint1 - kPoint0))).norm() < 1e-15);
     REQUIRE(shown.normal.norm() == Approx(1).epsilon(1e-15));
     const Vec3 blend = (1 - j / 50.0) * kNormal0 + j / 50.0 * kNormal1;
@@ -56,61 +58,61 @@ TEST_CASE("interpolation shows prev at j = 0 and last at j = n, bit for bit, and
   }
   for (int j = 50; j < 60; ++j) {
     track.Advance(1);
-    REQUIRE(SameBits(track.Surfaces()[0].plane.point, kPoint1));
-    REQUIRE(SameBits(track.Surfaces()[0].plane.normal, kNormal1));
+    REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.point, kPoint1));
+    REQUIRE(SameBits(track.Surfaces(kNoCopies)[0].plane.normal, kNormal1));
   }
 }
 
 TEST_CASE("an early frame starts from what is displayed now") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
-  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
   track.Advance(50);
-  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
   track.Advance(20);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.4));
-  track.Receive(Frame({PlaneAt(1, Vec3(2, 0, 0), kNormal0)}, 10'000'000), kFarFinger);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.4));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.4));
+  track.Receive(Frame({PlaneAt(1, Vec3(2, 0, 0), kNormal0)}, 10'000'000), kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.4));
   track.Advance(5);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(1.2));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(1.2));
   track.Advance(3);  // two of them missed
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(1.68));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(1.68));
 }
 
 TEST_CASE("hold and extrapolate follow the newest frame") {
   FeatureTrack hold(DisplayRule::kHold, kPeriodNs);
   FeatureTrack extrapolate(DisplayRule::kExtrapolate, kPeriodNs);
   for (FeatureTrack* track : {&hold, &extrapolate}) {
-    track->Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger);
+    track->Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
     track->Advance(50);
-    track->Receive(Frame({PlaneAt(1, Vec3(0.1, 0, 0), kNormal0)}), kFarFinger);
-    REQUIRE(SameBits(track->Surfaces()[0].plane.point, Vec3(0.1, 0, 0)));
+    track->Receive(Frame({PlaneAt(1, Vec3(0.1, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
+    REQUIRE(SameBits(track->Surfaces(kNoCopies)[0].plane.point, Vec3(0.1, 0, 0)));
     track->Advance(25);
   }
-  REQUIRE(SameBits(hold.Surfaces()[0].plane.point, Vec3(0.1, 0, 0)));
-  REQUIRE(extrapolate.Surfaces()[0].plane.point.x() == Approx(0.15));
+  REQUIRE(SameBits(hold.Surfaces(kNoCopies)[0].plane.point, Vec3(0.1, 0, 0)));
+  REQUIRE(extrapolate.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.15));
   extrapolate.Advance(1000);
-  REQUIRE(extrapolate.Surfaces()[0].plane.point.x() == Approx(0.2));  // stops at n
+  REQUIRE(extrapolate.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.2));  // stops at n
 }
 
 TEST_CASE("a world faster than the haptic loop, and a fractional n") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
-  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}, 100'000), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(0, 0, 0), kNormal0)}, 100'000), kFarFinger, kNoCopies);
   track.Advance(1);
-  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}, 2'500'000), kFarFinger);
+  track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0)}, 2'500'000), kFarFinger, kNoCopies);
   track.Advance(2);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == Approx(0.8));
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(0.8));
   track.Advance(1);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == 1);
 }
 
 TEST_CASE("opposite normals give a finite unit normal at every tick") {
   for (const DisplayRule rule : {DisplayRule::kInterpolate, DisplayRule::kExtrapolate}) {
     FeatureTrack track(rule, kPeriodNs);
-    track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger);
+    track.Receive(Frame({PlaneAt(1, kPoint0, kNormal0)}), kFarFinger, kNoCopies);
     track.Advance(50);
-    track.Receive(Frame({PlaneAt(1, kPoint0, -kNormal0)}), kFarFinger);
+    track.Receive(Frame({PlaneAt(1, kPoint0, -kNormal0)}), kFarFinger, kNoCopies);
     for (int j = 0; j <= 60; ++j) {
-      REQUIRE(track.Surfaces()[0].plane.normal.norm() == Approx(1).epsilon(1e-14));
+      REQUIRE(track.Surfaces(kNoCopies)[0].plane.normal.norm() == Approx(1).epsilon(1e-14));
       track.Advance(1);
     }
   }
@@ -119,30 +121,30 @@ TEST_CASE("opposite normals give a finite unit normal at every tick") {
 TEST_CASE("identity is body, generation, feature and pointer, not the place in the list") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
   track.Receive(Frame({PlaneAt(1, Vec3(1, 0, 0), kNormal0), PlaneAt(2, Vec3(2, 0, 0), kNormal0)}),
-                kFarFinger);
+                kFarFinger, kNoCopies);
   track.Advance(50);
   protocol::Plane reborn = PlaneAt(1, Vec3(5, 0, 0), kNormal0);
   reborn.generation = 2;
-  track.Receive(Frame({reborn, PlaneAt(2, Vec3(2.5, 0, 0), kNormal0)}), kFarFinger);
-  const auto shown = track.Surfaces();
+  track.Receive(Frame({reborn, PlaneAt(2, Vec3(2.5, 0, 0), kNormal0)}), kFarFinger, kNoCopies);
+  const auto shown = track.Surfaces(kNoCopies);
   REQUIRE(shown.size() == 2);
   REQUIRE(shown[0].plane.point.x() == 5);  // a new one starts in its place
   REQUIRE(shown[1].plane.point.x() == 2);  // the old one from where it was
   REQUIRE(track.Has(3, 2, 0));
   REQUIRE(track.Has(3, 1, 0));  // feature 2 still is of generation 1
-  track.Receive(Frame({}), kFarFinger);
-  REQUIRE(track.Surfaces().empty());
+  track.Receive(Frame({}), kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).empty());
   REQUIRE_FALSE(track.Has(3, 1, 0));
 }
 
 TEST_CASE("planes of one identity pair in their order") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
   track.Receive(Frame({PlaneAt(0, Vec3(1, 0, 0), kNormal0), PlaneAt(0, Vec3(2, 0, 0), kNormal1)}),
-                kFarFinger);
+                kFarFinger, kNoCopies);
   track.Receive(Frame({PlaneAt(0, Vec3(3, 0, 0), kNormal0), PlaneAt(0, Vec3(4, 0, 0), kNormal1)}),
-                kFarFinger);
-  REQUIRE(track.Surfaces()[0].plane.point.x() == 1);
-  REQUIRE(track.Surfaces()[1].plane.point.x() == 2);
+                kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.x() == 2);
 }
 
 TEST_CASE("a surface that appears above the finger rises to its place without a jump") {
@@ -150,20 +152,111 @@ TEST_CASE("a surface that appears above the finger rises to its place without a 
   const Vec3 up = Vec3::UnitY();
   // 8 mm deep with the radius; 1 mm of it was to be expected.
   const std::array<FingerState, 1> finger = {FingerState{Vec3(0, 0.002, 0), 0.01, 0.001}};
-  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger);
-  const auto depth = [&] { return track.Surfaces()[0].plane.point.y() + 0.01 - 0.002; };
+  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger, kNoCopies);
+  const auto depth = [&] { return track.Surfaces(kNoCopies)[0].plane.point.y() + 0.01 - 0.002; };
   REQUIRE(depth() == Approx(0.001));
   double before = depth();
   for (int k = 1; k <= 100; ++k) {
-    if (k == 30) track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger);
+    if (k == 30) track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up)}), finger, kNoCopies);
     track.Advance(1);
     REQUIRE(depth() > before);
     REQUIRE(depth() - before < 0.007 / 100 * 1.001);
     before = depth();
   }
   REQUIRE(depth() == Approx(0.008));
-  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up), PlaneAt(2, Vec3(0, -0.0071, 0), up)}), finger);
-  REQUIRE(track.Surfaces()[1].plane.point.y() == -0.0071);  // 0.9 mm deep: a normal approach
+  track.Receive(Frame({PlaneAt(1, Vec3::Zero(), up), PlaneAt(2, Vec3(0, -0.0071, 0), up)}), finger,
+                kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.y() ==
+          -0.0071);  // 0.9 mm deep: a normal approach
+}
+
+TEST_CASE("a plane may bring a recovery time of its own, and rises within it") {
+  for (const double recovery_s : {0.02, 0.5}) {
+    FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+    protocol::Plane plane = PlaneAt(1, Vec3::Zero(), Vec3::UnitX());
+    plane.recovery_s = recovery_s;
+    const std::array<FingerState, 1> finger = {FingerState{Vec3(-0.004, 0, 0), 0.001, 0}};
+    track.Receive(Frame({plane}), finger, kNoCopies);
+    const int ticks = static_cast<int>(recovery_s * 1000);
+    for (int k = 0; k <= ticks + 5; ++k) {
+      const double left = std::max(0.0, 1 - k / static_cast<double>(ticks));
+      REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(-0.005 * left).margin(1e-15));
+      REQUIRE(track.Surfaces(kNoCopies)[0].strength == 1);
+      track.Advance(1);
+    }
+  }
+}
+
+TEST_CASE("a surface that vanishes while it is pressed fades where it was; others go at once") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  protocol::Plane pressed = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  protocol::Plane slow = PlaneAt(2, Vec3(0.003, 0, 0), Vec3::UnitY());
+  slow.recovery_s = 0.4;
+  const protocol::Plane free = PlaneAt(3, Vec3(0, 0, -0.02), Vec3::UnitZ());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0.008, 0), 0.01, 1}};
+  track.Receive(Frame({pressed, slow, free}), finger, kNoCopies);
+  track.Advance(50);
+  pressed.point[0] = 0.005;  // on the way there when it vanishes
+  track.Receive(Frame({pressed, slow, free}), finger, kNoCopies);
+  track.Advance(25);
+  track.Receive(Frame({}), finger, kNoCopies);
+  REQUIRE_FALSE(track.Has(3, 1, 0));
+  for (int k = 0; k < 400; ++k) {
+    const auto surfaces = track.Surfaces(kNoCopies);
+    REQUIRE(surfaces.size() == (k < 100 ? 2U : 1U));
+    if (k < 100) {
+      REQUIRE(surfaces[0].feature == 1);
+      REQUIRE(surfaces[0].plane.point.x() == Approx(0.004));
+      REQUIRE(surfaces[0].strength == Approx(1 - k / 100.0));
+    }
+    REQUIRE(surfaces.back().feature == 2);
+    REQUIRE(surfaces.back().strength == Approx(1 - k / 400.0));
+    if (k % 50 == 49) track.Receive(Frame({}), finger, kNoCopies);  // frames go on
+    track.Advance(1);
+  }
+  REQUIRE(track.Surfaces(kNoCopies).empty());
+}
+
+TEST_CASE("a surface that comes back while it fades grows strong again without a step") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  const protocol::Plane plane = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0, 0), 0.01, 1}};
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  track.Receive(Frame({}), finger, kNoCopies);
+  track.Advance(70);
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 1);
+  for (int k = 0; k < 90; ++k) {
+    REQUIRE(track.Surfaces(kNoCopies)[0].strength == Approx(std::min(1.0, 0.3 + k / 100.0)));
+    track.Advance(1);
+  }
+  REQUIRE(track.Has(3, 1, 0));
+}
+
+TEST_CASE("a body of another generation takes the place of the old one at once") {
+  FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+  protocol::Plane plane = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0, 0), 0.01, 1}};
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  ++plane.generation;
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[0].generation == plane.generation);
+}
+
+TEST_CASE("a fading surface gives way to those of the frame when there is no room") {
+  FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+  const std::array<FingerState, 1> finger = {FingerState{Vec3::Zero(), 0.01, 1}};
+  std::vector<protocol::Plane> planes(protocol::kMaxPlanes,
+                                      PlaneAt(0, Vec3::Zero(), Vec3::UnitX()));
+  for (std::uint32_t i = 0; i < planes.size(); ++i) planes[i].feature = i;
+  track.Receive(Frame(planes), finger, kNoCopies);
+  for (std::uint32_t i = 0; i < planes.size(); ++i) planes[i].feature = 100 + i;
+  planes.pop_back();
+  track.Receive(Frame(planes), finger, kNoCopies);
+  const auto surfaces = track.Surfaces(kNoCopies);
+  REQUIRE(surfaces.size() == protocol::kMaxPlanes);
+  for (std::size_t i = 0; i + 1 < surfaces.size(); ++i) REQUIRE(surfaces[i].feature >= 100);
 }
 
 TEST_CASE("damaged planes and planes of other pointers are left out") {
@@ -184,14 +277,14 @@ TEST_CASE("damaged planes and planes of other pointers are left out") {
   planes.back().pointer = 1;
   planes.push_back(PlaneAt(7, kPoint0, 3 * kNormal0));  // long, but a direction
   planes.push_back(PlaneAt(8, Vec3(1e-310, 0, 0), kNormal0));
-  track.Receive(Frame(planes), kFarFinger);
-  REQUIRE(track.Surfaces().size() == 2);
-  REQUIRE((track.Surfaces()[0].plane.normal - kNormal0).norm() < 1e-15);
-  REQUIRE(track.Surfaces()[1].plane.point.x() == 0);  // no denormals inside the loop
+  track.Receive(Frame(planes), kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 2);
+  REQUIRE((track.Surfaces(kNoCopies)[0].plane.normal - kNormal0).norm() < 1e-15);
+  REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.x() == 0);  // no denormals inside the loop
   protocol::WorldFrame lying = Frame({});
   lying.plane_count = 4'000'000'000U;
-  track.Receive(lying, kFarFinger);
-  REQUIRE(track.Surfaces().size() <= protocol::kMaxPlanes);
+  track.Receive(lying, kFarFinger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() <= protocol::kMaxPlanes);
 }
 
 }  // namespace
