@@ -12,6 +12,7 @@ constexpr double kUnitRounding = 1e-12;
 constexpr double kLargestStiffness = 1e8;  // N/m; damping alike
 constexpr double kLargestFriction = 1e3;
 constexpr double kLongestRecovery = 10;  // s
+constexpr double kFaded = 1e-9;          // of a force: rounding of the steps to zero
 constexpr std::int64_t kLongestFrameNs = 10'000'000'000;
 
 // Denormal numbers mean nothing in metres and cost a slow path in the processor.
@@ -79,7 +80,7 @@ void FeatureTrack::Advance(std::int64_t ticks) noexcept {
     feature.recovery_left = std::max(0.0, feature.recovery_left - step);
     feature.strength = feature.leaving ? std::max(0.0, feature.strength - step)
                                        : std::min(1.0, feature.strength + step);
-    if (feature.strength == 0) continue;
+    if (feature.strength < kFaded) continue;
     if (kept != i) features_[kept] = feature;
     ++kept;
   }

@@ -45,7 +45,7 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
   std::stringstream text;
   text << file.rdbuf();
   CHECK(KeysOf(text.str(), true) == KeysOf(description, false));
-  CHECK(KeysOf(text.str(), true).size() == 8);
+  CHECK(KeysOf(text.str(), true).size() == 9);
 
   const Settings defaults;
   CHECK(shipped.loop.rate_hz == defaults.loop.rate_hz);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
 #include <optional>
 #include <string>
 
@@ -21,8 +22,29 @@ constexpr std::array kOfSurface = {kStaticFriction, kRecovery};
 constexpr double kLargestFriction = 100;
 constexpr double kLongestRecovery = 10;  // s, SPEC.md 6.2
 
+// "file:line". libsdformat keeps no line of elements that it does not know: it is sought from the
+// parent's line on, past the elements of this name that come before.
+std::string PlaceOfExtension(const sdf::ElementPtr& element) {
+  const sdf::ElementPtr parent = element->GetParent();
+  if (element->LineNumber() || !parent || !parent->LineNumber()) return PlaceOf(element);
+  int to_pass = 0;
+  for (auto child = parent->GetFirstElement(); child != element; child = child->GetNextElement()) {
+    if (child->GetName() == element->GetName()) ++to_pass;
+  }
+  std::ifstream file(parent->FilePath());
+  std::string line;
+  for (int number = 1; std::getline(file, line); ++number) {
+    if (number < *parent->LineNumber()) continue;
+    const std::string tag = "<" + element->GetName();
+    for (auto at = line.find(tag); at != std::string::npos; at = line.find(tag, at + 1)) {
+      if (to_pass-- == 0) return parent->FilePath() + ":" + std::to_string(number);
+    }
+  }
+  return PlaceOf(parent);
+}
+
 [[noreturn]] void Refuse(const sdf::ElementPtr& element, const std::string& why) {
-  throw ConfigError(PlaceOf(element) + ": <" + element->GetName() + "> " + why);
+  throw ConfigError(PlaceOfExtension(element) + ": <" + element->GetName() + "> " + why);
 }
 
 std::string Number(double value) {
