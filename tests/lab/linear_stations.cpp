@@ -6,6 +6,7 @@
 #include "common/body_step.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/feature_track.h"
+#include "haptic_server/render/local_bodies.h"
 #include "haptic_server/render/surface_force.h"
 #include "world_server/coupling/kick.h"
 #include "world_server/physics/sliding_block.h"
@@ -30,14 +31,15 @@ protocol::WorldFrame Frame(double surface_x, int ticks, std::int64_t period_ns) 
 std::vector<double> Displayed(haptic::DisplayRule rule, int ticks, double previous, double last) {
   constexpr std::int64_t kPeriodNs = 1'000'000;  // any: weights depend on their number only
   haptic::FeatureTrack track(rule, kPeriodNs);
+  const haptic::LocalBodies no_copies(kPeriodNs, 0, 0, PositionRule::kSemiImplicit);
   const haptic::FingerState finger{.position = Vec3(-1e3, 0, 0)};  // far: nothing to recover from
-  track.Receive(Frame(previous, ticks, kPeriodNs), {&finger, 1});
+  track.Receive(Frame(previous, ticks, kPeriodNs), {&finger, 1}, no_copies);
   track.Advance(ticks);
-  track.Receive(Frame(last, ticks, kPeriodNs), {&finger, 1});
+  track.Receive(Frame(last, ticks, kPeriodNs), {&finger, 1}, no_copies);
   std::vector<double> shown;
   for (int j = 0; j < ticks; ++j) {
     if (j > 0) track.Advance(1);
-    shown.push_back(track.Surfaces()[0].plane.point.x());
+    shown.push_back(track.Surfaces(no_copies)[0].plane.point.x());
   }
   return shown;
 }

@@ -45,7 +45,7 @@ struct Case {
   /// name, of which the first that takes the table runs it. Empty = takes any.
   std::function<bool(const Table& table)> takes;
 
-  /// The rows that are run when no table is given.
+  /// The rows that are run when no table is given: of several Cases of one name, those of the first.
   std::function<Table(bool quick)> grid;
 
   /// Computes one row: a pure function of its arguments, called from several threads. Throws

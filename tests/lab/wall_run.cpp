@@ -65,7 +65,8 @@ WallRun::WallRun(const WallSurface& wall, haptic::Device& device)
            /*phase_ticks=*/0) {}
 
 double WallRun::impulse() const {
-  return static_cast<double>(run_.haptic_health().books.displayed[0]) * protocol::kImpulseUnit;
+  const protocol::Books& books = run_.haptic_health().books;
+  return static_cast<double>(books.displayed[0] + books.ground[0]) * protocol::kImpulseUnit;
 }
 
 PressedDevice::PressedDevice(const Setup& setup) : setup_(setup), position_(setup.start_m) {

@@ -54,6 +54,9 @@ class PressedDevice final : public haptic::Device {
   void Release() noexcept override { force_ = 0; }
   std::string Name() const override { return "pressed device"; }
 
+  /// Changes the constant force.
+  void Press(double force_n) { setup_.press_n = force_n; }
+
   double position() const { return position_; }  // m, now
   double velocity() const { return velocity_; }  // m/s
 
