@@ -195,7 +195,11 @@ ExtremeResult SimulateExtreme(const ExtremeRun& extreme) {
       const double t_s = static_cast<double>(k) * period_s;
       run.SilenceWorld(t_s >= kSilenceFrom && t_s < kSilenceFrom + kSilence);
     }
-    outbound.Look(run, run.Tick());
+    const bool world_ticked = run.Tick();
+    outbound.Look(run.haptic_tick(), run.haptic_health());
+    if (world_ticked) {
+      outbound.Look(run.world_frame(), run.world().health(), run.world().Bodies());
+    }
   }
   return {.sound = outbound.sound(),
           .complaint = outbound.complaint(),
@@ -203,7 +207,8 @@ ExtremeResult SimulateExtreme(const ExtremeRun& extreme) {
           .largest_force_n = device.largest_force_n(),
           .largest_step_n = device.largest_step_n(),
           .force_cap_n = haptic_settings.safety.force_cap_n,
-          .step_limit_n = haptic_settings.safety.slew_limit_n_per_s * period_s};
+          .step_limit_n = haptic_settings.safety.slew_limit_n_per_s * period_s,
+          .flagged = run.haptic_health().energy.flagged > 0};
 }
 
 }  // namespace rikiseki::lab

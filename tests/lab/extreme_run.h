@@ -32,7 +32,7 @@ struct ExtremeRun {
   double stiffness_n_per_m = 2000;
   double damping_ns_per_m = 0;
   double mass_kg = 1;
-  std::optional<haptic::Impedance> hand;  // with the device; none = the finger is clamped
+  std::optional<haptic::Impedance> hand = {};  // with the device; none = the finger is clamped
   double duration_s = 10;
 };
 

@@ -8,6 +8,7 @@
 #include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
+#include "tests/lab/extremes.h"
 #include "tests/lab/fig6.h"
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
@@ -20,7 +21,7 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6(), Planes(), Pushes(), Wall(), MultirateMasses(), MultirateGrowth()};
+  return {Extremes(), Fig6(), MultirateMasses(), MultirateGrowth(), Planes(), Pushes(), Wall()};
 }
 
 struct Options {

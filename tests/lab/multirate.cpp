@@ -12,40 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "tests/lab/hand_column.h"
 #include "tests/lab/multirate_loop.h"
 
 namespace rikiseki::lab {
 namespace {
-
-struct NamedHand {
-  const char* name;
-  LoopHand impedance;
-};
-
-// The device's 0.03 kg and 0.2 Ns/m included.
-const std::array<NamedHand, 6> kHands{{{"finger", haptic::Impedance{0.038, 3.2, 300}},
-                                       {"light", haptic::Impedance{0.13, 2.2, 50}},
-                                       {"medium", haptic::Impedance{0.58, 6.7, 135}},
-                                       {"firm", haptic::Impedance{0.93, 15.2, 500}},
-                                       {"stiff", haptic::Impedance{1.53, 30.2, 1000}},
-                                       {"clamped", std::nullopt}}};
-
-// A name, or "m b k" in SI units.
-LoopHand ParseHand(const Row& row) {
-  const std::string text = row.Text("hand");
-  for (const NamedHand& hand : kHands) {
-    if (text == hand.name) return hand.impedance;
-  }
-  std::istringstream words(text);
-  haptic::Impedance hand;
-  std::string rest;
-  if (!(words >> hand.mass_kg >> hand.damping_ns_per_m >> hand.stiffness_n_per_m) ||
-      words >> rest || !(hand.mass_kg > 0) || !(hand.damping_ns_per_m >= 0) ||
-      !(hand.stiffness_n_per_m >= 0)) {
-    row.Refuse("hand", "finger, light, medium, firm, stiff, clamped, or m b k is expected");
-  }
-  return hand;
-}
 
 constexpr int kMostTicks = 100'000;  // per world period
 

@@ -15,34 +15,32 @@ OutboundCheck::OutboundCheck()
                        protocol::WorldBodiesBytes(kMostBodies)}) /
              sizeof(std::uint64_t)) {}
 
-void OutboundCheck::Look(const CoupledRun& run, bool world_ticked) {
-  tick_ = run.haptic_tick().tick;
-  Check("haptic.tick", run.haptic_tick());
-  Check("haptic.health", run.haptic_health());
-  if (!world_ticked) return;
-  Check("world.frame", run.world_frame());
-  Check("world.health", run.world().health());
-  CheckBodies(run.world().Bodies());
+void OutboundCheck::Look(const protocol::HapticTick& tick, const protocol::HapticHealth& health) {
+  Check("haptic.tick", tick.tick, tick);
+  Check("haptic.health", tick.tick, health);
 }
 
-template <typename Message>
-void OutboundCheck::Check(const char* name, const Message& message) {
-  const protocol::Encoded encoded = protocol::Encode(message, words_);
-  Message read;
-  Complain(name, protocol::Decode(words_, encoded, read));
-}
-
-void OutboundCheck::CheckBodies(const std::vector<protocol::Body>& bodies) {
+void OutboundCheck::Look(const protocol::WorldFrame& frame, const protocol::WorldHealth& health,
+                         const std::vector<protocol::Body>& bodies) {
+  Check("world.frame", frame.frame, frame);
+  Check("world.health", frame.frame, health);
   const protocol::Encoded encoded = protocol::Encode(std::span(bodies), words_);
   std::vector<protocol::Body> read(kMostBodies);
   std::uint32_t count = 0;
-  Complain("world.bodies", protocol::Decode(words_, encoded, std::span(read), count));
+  Complain("world.bodies", frame.frame, protocol::Decode(words_, encoded, std::span(read), count));
 }
 
-void OutboundCheck::Complain(const char* name, protocol::DecodeStatus status) {
+template <typename Message>
+void OutboundCheck::Check(const char* name, std::uint64_t number, const Message& message) {
+  const protocol::Encoded encoded = protocol::Encode(message, words_);
+  Message read;
+  Complain(name, number, protocol::Decode(words_, encoded, read));
+}
+
+void OutboundCheck::Complain(const char* name, std::uint64_t number,
+                             protocol::DecodeStatus status) {
   if (status == protocol::DecodeStatus::kOk || !complaint_.empty()) return;
-  complaint_ =
-      std::string(name) + " of tick " + std::to_string(tick_) + ": " + protocol::Describe(status);
+  complaint_ = std::string(name) + " " + std::to_string(number) + ": " + protocol::Describe(status);
 }
 
 }  // namespace rikiseki::lab

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocol/codec.h"
-#include "tests/lab/coupled_run.h"
+#include "protocol/messages.h"
 
 namespace rikiseki::lab {
 
@@ -15,9 +15,10 @@ class OutboundCheck {
  public:
   OutboundCheck();
 
-  /// Looks at all messages of the last haptic tick, and of the world tick before it, if there was
-  /// one.
-  void Look(const CoupledRun& run, bool world_ticked);
+  /// What a tick of either side publishes.
+  void Look(const protocol::HapticTick& tick, const protocol::HapticHealth& health);
+  void Look(const protocol::WorldFrame& frame, const protocol::WorldHealth& health,
+            const std::vector<protocol::Body>& bodies);
 
   bool sound() const { return complaint_.empty(); }
   /// The first message that was not, in words; empty = none.
@@ -25,12 +26,10 @@ class OutboundCheck {
 
  private:
   template <typename Message>
-  void Check(const char* name, const Message& message);
-  void CheckBodies(const std::vector<protocol::Body>& bodies);
-  void Complain(const char* name, protocol::DecodeStatus status);
+  void Check(const char* name, std::uint64_t number, const Message& message);
+  void Complain(const char* name, std::uint64_t number, protocol::DecodeStatus status);
 
   std::vector<std::uint64_t> words_;
-  std::uint64_t tick_ = 0;
   std::string complaint_;
 };
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/body_step.h"
+#include "world_server/physics/box_pair_contact.h"
 #include "world_server/physics/box_plane_contact.h"
 #include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
@@ -49,6 +50,7 @@ struct BulletWorld::Engine {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher{&configuration};
   BoxPlaneContact box_plane_contact{dispatcher};
+  BoxPairContact box_pair_contact{dispatcher};
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
