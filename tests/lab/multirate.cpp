@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "tests/lab/hand_column.h"
-#include "tests/lab/multirate_loop.h"
+#include "tests/lab/stable_masses.h"
 
 namespace rikiseki::lab {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include "tests/lab/multirate_loop.h"
+#include "tests/lab/stable_masses.h"
 #include "tests/lab/wall_run.h"
 #include "world_server/physics/bullet_world.h"
 

@@ -1,5 +1,6 @@
 #include "tests/lab/multirate.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
@@ -10,6 +11,7 @@
 #include "haptic_server/render/local_bodies.h"
 #include "tests/lab/multirate_loop.h"
 #include "tests/lab/multirate_oracle.h"
+#include "tests/lab/stable_masses.h"
 
 namespace rikiseki::lab {
 namespace {
@@ -221,6 +223,17 @@ TEST_CASE("stable intervals end where growth begins, and hold what is narrower t
     CHECK(map.SpectralRadius(to * (1 + 1e-6)) > 1);
     if (i + 1 < intervals.size()) CHECK(to < intervals[i + 1].from);
   }
+}
+
+TEST_CASE("a stable interval far narrower than the scan is found") {
+  // Growth dips to 1 between masses that are tried: 0.23332..0.23333 kg.
+  const auto intervals = StableIntervals(PeriodMap({.method = LoopMethod::kLocalSemiImplicitWorld,
+                                                    .hand = {},
+                                                    .damping_ns_per_m = 2,
+                                                    .ticks_per_period = 100}));
+  CHECK(std::any_of(intervals.begin(), intervals.end(), [](const StableInterval& interval) {
+    return interval.from > 0.233 && interval.to < 0.234;
+  }));
 }
 
 TEST_CASE("a loop that leaves the range of numbers within a period grows by inf") {

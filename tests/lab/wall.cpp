@@ -242,6 +242,20 @@ void Summarise(const Table& rows, const std::vector<Outcome>& outcomes, std::ost
   out << std::defaultfloat;
 }
 
+// The linear loop and the running one must agree on every limit.
+std::size_t Judge(const Table& rows, const std::vector<Outcome>& outcomes, std::ostream& out) {
+  std::size_t missed = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (outcomes[i].texts[0] != "0") continue;
+    ++missed;
+    const Row row = rows.row(i);
+    out << "not stable below and unstable above the limit: T = " << row.Text("T_s")
+        << ", m = " << row.Text("m_kg") << ", b = " << row.Text("b_Ns_m")
+        << ", B = " << row.Text("B_Ns_m") << ", delay " << row.Text("delay_samples") << "\n";
+  }
+  return missed;
+}
+
 }  // namespace
 
 Case Wall() {
@@ -257,6 +271,7 @@ Case Wall() {
   study.run = RunRow;
   study.agrees = Agrees;
   study.summarise = Summarise;
+  study.judge = Judge;
   return study;
 }
 
