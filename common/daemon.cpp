@@ -2,13 +2,11 @@
 
 #include <signal.h>
 
-#include <boost/program_options.hpp>
+#include <cctype>
 #include <cstdio>
-#include <cstdlib>
-#include <iostream>
 
+#include "common/command_line.h"
 #include "common/exit_code.h"
-#include "common/version.h"
 
 namespace rikiseki {
 namespace po = boost::program_options;
@@ -28,41 +26,22 @@ DaemonOptions ParseDaemonOptions(int argc, char** argv, const std::string& progr
                                  const std::vector<ExtraOption>& extra) {
   DaemonOptions options;
   options.extra.resize(extra.size());
-  po::options_description description(program + ": " + purpose);
-  description.add_options()("config", po::value(&options.config)->value_name("FILE"),
-                            "settings; every key is explained there")(
+  CommandLine line{.program = program,
+                   .visible = po::options_description(program + ": " + purpose)};
+  line.visible.add_options()("config", po::value(&options.config)->value_name("FILE"),
+                             "settings; every key is explained there")(
       "set", po::value(&options.set)->value_name("section.key=value")->composing(),
       "overrides one setting; may be repeated")("instance",
                                                 po::value(&options.instance)->value_name("NAME"),
                                                 "which pair of daemons (default 0)")(
       "check", po::bool_switch(&options.check),
-      "validates the settings, prints them and what would run")("version", "prints the version")(
-      "help", "prints this");
+      "validates the settings, prints them and what would run");
   for (std::size_t i = 0; i < extra.size(); ++i) {
-    description.add_options()(extra[i].name.c_str(),
-                              po::value(&options.extra[i])->value_name(extra[i].value_name),
-                              extra[i].doc.c_str());
+    line.visible.add_options()(extra[i].name.c_str(),
+                               po::value(&options.extra[i])->value_name(extra[i].value_name),
+                               extra[i].doc.c_str());
   }
-  po::variables_map values;
-  try {
-    // No positional arguments: a stray word is refused, not skipped.
-    po::store(po::command_line_parser(argc, argv)
-                  .options(description)
-                  .positional(po::positional_options_description())
-                  .run(),
-              values);
-    po::notify(values);
-  } catch (const po::error& error) {
-    throw StartError(kExitUsage, std::string(error.what()) + "; try --help");
-  }
-  if (values.count("help") != 0) {
-    std::cout << description;
-    std::exit(kExitOk);
-  }
-  if (values.count("version") != 0) {
-    std::cout << program << " " << kVersion << " (" << kBuild << ")\n";
-    std::exit(kExitOk);
-  }
+  ParseCommandLine(argc, argv, line);
   if (options.config.empty()) throw StartError(kExitUsage, "--config FILE is required; try --help");
   for (const char c : options.instance) {
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '_' && c != '-') {

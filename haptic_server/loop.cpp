@@ -17,13 +17,14 @@ constexpr std::int64_t kLongestReleaseNs = 110'000'000;
 }  // namespace
 
 HapticLoop::HapticLoop(const Settings& settings, HapticStep& step, protocol::SegmentOwner& owner,
-                       protocol::PeerLink& link)
+                       protocol::PeerLink& link, OperatorPanel& panel)
     : period_ns_(settings.period_ns()),
       health_every_(
           std::max<std::uint64_t>(1, static_cast<std::uint64_t>(kHealthPeriodNs / period_ns_))),
       step_(step),
       owner_(owner),
       link_(link),
+      panel_(panel),
       ticks_(owner.Writer<protocol::HapticTick>()),
       healths_(owner.Writer<protocol::HapticHealth>()) {}
 
@@ -49,7 +50,9 @@ bool HapticLoop::IsReleased() noexcept {
     release_ticks_left_ = kLongestReleaseNs / period_ns_ + 1;
     return false;
   }
-  return step_.health().reason == protocol::ForceReason::kWorldAbsent || --release_ticks_left_ <= 0;
+  const protocol::ForceReason reason = step_.health().reason;
+  return reason == protocol::ForceReason::kWorldAbsent ||
+         reason == protocol::ForceReason::kEmergencyStop || --release_ticks_left_ <= 0;
 }
 
 void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) noexcept {
@@ -58,7 +61,7 @@ void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_
                       .missed = missed};
   WorldInput world = ReadWorld();
   if (releasing_) world.ready = false;
-  step_.Tick(time, world, tick_);
+  step_.Tick(time, world, tick_, panel_.Take());
   previous_start_ns_ = now_ns;
   PublishTick();
 
@@ -86,6 +89,10 @@ WorldInput HapticLoop::ReadWorld() noexcept {
     frames_ = link_.TakeNext()->Reader<protocol::WorldFrame>();
     read = read_latest();
   }
+  if (read == protocol::ReadStatus::kFresh) {
+    coupling_.store(frame_.coupling, std::memory_order_relaxed);
+    world_period_ns_.store(frame_.period_ns, std::memory_order_relaxed);
+  }
   if (frames_.hopeless()) link_.Refuse();
   const protocol::PeerView* view = link_.current();
   if (view == nullptr) return {};
@@ -100,6 +107,7 @@ void HapticLoop::PublishTick() noexcept {
   ticks_.Publish(tick_, now_ns);
   owner_.Heartbeat(tick_.tick, now_ns);
   reason_.store(step_.health().reason, std::memory_order_relaxed);
+  unstable_.store(step_.health().energy.unstable != 0, std::memory_order_relaxed);
 }
 
 void HapticLoop::PublishHealth() noexcept {

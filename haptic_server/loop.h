@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 
+#include "haptic_server/operator_panel.h"
 #include "haptic_server/settings.h"
 #include "haptic_server/step.h"
 #include "protocol/owner.h"
@@ -18,7 +19,7 @@ class HapticLoop {
  public:
   /// All outlive the loop.
   HapticLoop(const Settings& settings, HapticStep& step, protocol::SegmentOwner& owner,
-             protocol::PeerLink& link);
+             protocol::PeerLink& link, OperatorPanel& panel);
 
   /// What the scheduler gave; shown to whoever asks for health.
   void SetScheduling(const protocol::Scheduling& scheduling) { scheduling_ = scheduling; }
@@ -35,6 +36,20 @@ class HapticLoop {
   /// Why the force is what it is; for the supervisor, from any thread.
   protocol::ForceReason reason() const noexcept { return reason_.load(std::memory_order_relaxed); }
 
+  /// Whether the present contact is unstable; likewise.
+  bool unstable() const noexcept { return unstable_.load(std::memory_order_relaxed); }
+
+  /// Coupling and period [ns] of the newest frame; 0 = none came yet. Likewise.
+  struct WorldMode {
+    protocol::Coupling coupling{};
+    std::uint64_t period_ns = 0;
+    bool operator==(const WorldMode&) const = default;
+  };
+  WorldMode world_mode() const noexcept {
+    return {coupling_.load(std::memory_order_relaxed),
+            world_period_ns_.load(std::memory_order_relaxed)};
+  }
+
  private:
   bool IsReleased() noexcept;
   WorldInput ReadWorld() noexcept;
@@ -46,6 +61,7 @@ class HapticLoop {
   HapticStep& step_;
   protocol::SegmentOwner& owner_;
   protocol::PeerLink& link_;
+  OperatorPanel& panel_;
 
   protocol::MessageWriter<protocol::HapticTick> ticks_;
   protocol::MessageWriter<protocol::HapticHealth> healths_;
@@ -58,6 +74,9 @@ class HapticLoop {
   protocol::Histogram duration_{};
   protocol::Scheduling scheduling_;
   std::atomic<protocol::ForceReason> reason_{protocol::ForceReason::kWorldAbsent};
+  std::atomic<bool> unstable_{false};
+  std::atomic<protocol::Coupling> coupling_{protocol::Coupling::kImpulse};
+  std::atomic<std::uint64_t> world_period_ns_{0};
   std::int64_t previous_start_ns_ = 0;
   std::uint64_t performed_ = 0;
   bool releasing_ = false;

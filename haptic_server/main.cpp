@@ -11,7 +11,9 @@
 #include "common/realtime.h"
 #include "common/version.h"
 #include "haptic_server/device/spidar.h"
+#include "haptic_server/keyboard.h"
 #include "haptic_server/loop.h"
+#include "haptic_server/safety/stability.h"
 #include "protocol/words.h"
 
 namespace {
@@ -21,6 +23,24 @@ using namespace rikiseki::haptic;  // NOLINT(google-build-using-namespace)
 
 constexpr int kSupervisorPollMs = 100;
 constexpr std::uint64_t kHealthPeriodNs = 10'000'000;
+
+constexpr char kPurpose[] =
+    "the device daemon of Rikiseki\n\n"
+    "SIGUSR1 is the emergency stop: minimum tension within one tick, until SIGUSR2 enables again.\n"
+    "On a terminal: space or enter = emergency stop, e = enable again, c = clutch on and off.";
+
+OperatorPanel panel;
+
+// The signals of the emergency stop. The handlers do nothing but count.
+void CatchOperatorSignals() {
+  struct sigaction action {};
+  sigemptyset(&action.sa_mask);
+  action.sa_flags = SA_RESTART;
+  action.sa_handler = [](int) { panel.Stop(); };
+  sigaction(SIGUSR1, &action, nullptr);
+  action.sa_handler = [](int) { panel.Enable(); };
+  sigaction(SIGUSR2, &action, nullptr);
+}
 
 // A world that publishes late by as much as its period must not be lapped (SPEC.md 6.1).
 std::uint32_t TickSlots(const Settings& settings) {
@@ -49,17 +69,29 @@ protocol::Scheduling JudgeRealtime(const Settings& settings, const RealtimeObtai
 
 // Contact, its limits and its absence: what happens all the time and is not worth a line.
 bool IsRendering(protocol::ForceReason reason) {
-  return reason <= protocol::ForceReason::kSoftStart;
+  return reason <= protocol::ForceReason::kSoftStart || reason == protocol::ForceReason::kPassivity;
 }
 
 // Logs what changed, for the tick may not; ends on SIGINT or SIGTERM.
-void Supervise(const HapticLoop& loop, protocol::PeerLink& link) {
+void Supervise(const Settings& settings, const HapticLoop& loop, protocol::PeerLink& link) {
   protocol::ForceReason logged = protocol::ForceReason::kNoContact;
+  HapticLoop::WorldMode mode;
+  bool unstable = false;
   while (true) {
     const int signal = WaitForSignal(kSupervisorPollMs);
     if (signal == SIGINT || signal == SIGTERM) return;
     if (signal == SIGHUP) spdlog::info("SIGHUP: haptic_server takes changed settings at a restart");
     for (const std::string& line : link.PollNews()) spdlog::info("world: {}", line);
+    if (loop.world_mode() != mode) {
+      mode = loop.world_mode();
+      const std::string advice =
+          CouplingAdvice(settings.render, mode.coupling, Seconds(mode.period_ns));
+      if (!advice.empty()) spdlog::info("stability: {}", advice);
+    }
+    if (loop.unstable() != unstable) {
+      unstable = !unstable;
+      if (unstable) spdlog::warn("the contact is unstable: lower the stiffness or raise damping");
+    }
     const protocol::ForceReason reason = loop.reason();
     if (IsRendering(reason) && IsRendering(logged)) continue;
     if (reason != logged) spdlog::info("force: {}", protocol::Sentence(reason));
@@ -68,14 +100,17 @@ void Supervise(const HapticLoop& loop, protocol::PeerLink& link) {
 }
 
 int Run(int argc, char** argv) {
-  const DaemonOptions options =
-      ParseDaemonOptions(argc, argv, "haptic_server", "the device daemon of Rikiseki",
-                         {{"device", "simulated", "wins over device.kind"}});
+  CatchOperatorSignals();
+  const DaemonOptions options = ParseDaemonOptions(
+      argc, argv, "haptic_server", kPurpose, {{"device", "simulated", "wins over device.kind"}});
   std::vector<std::string> overrides = options.set;
   if (!options.extra[0].empty()) overrides.push_back("device.kind=" + options.extra[0]);
   std::string description;
   const Settings settings = LoadSettings(options.config, overrides, &description);
   StartLogging("haptic_server");
+  for (const std::string& warning : DeviceWarnings(settings)) {
+    spdlog::warn("stability: {}", warning);
+  }
   if (options.check) {
     std::fputs(description.c_str(), stdout);
     return kExitOk;
@@ -95,7 +130,7 @@ int Run(int argc, char** argv) {
                                     .required = {{.type = protocol::StreamType::kWorldFrame}},
                                     .owners = {}}});
   HapticStep step(settings, *device, owner.epoch());
-  HapticLoop loop(settings, step, owner, link);
+  HapticLoop loop(settings, step, owner, link, panel);
 
   const std::string memory_refusal = LockMemory();
   std::atomic<bool> go{false};
@@ -110,7 +145,11 @@ int Run(int argc, char** argv) {
     go = true;
     spdlog::info("{} at {} Hz on {}, build {}", owner.name(), settings.loop.rate_hz, device->Name(),
                  kBuild);
-    Supervise(loop, link);
+    const Keyboard keyboard(panel);
+    if (keyboard.is_there()) {
+      spdlog::info("keys: space or enter = emergency stop, e = enable again, c = clutch");
+    }
+    Supervise(settings, loop, link);
   } catch (...) {
     stop = true;
     throw;

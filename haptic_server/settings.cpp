@@ -47,6 +47,8 @@ ConfigSchema DaemonSchema(Settings& settings) {
                 "How local copies of bodies advance; semi_implicit is for written experiments.");
   schema.Number("render.finger_radius_mm", &render.finger_radius_mm, 0, 100,
                 "Radius of the sphere that stands for the finger.");
+  schema.Number("render.friction_stiffness_n_per_m", &render.friction_stiffness_n_per_m, 1, 1e5,
+                "Stiffness that holds a sticking finger, on surfaces that have friction.");
 
   SafetySettings& safety = settings.safety;
   schema.Number("safety.force_cap_n", &safety.force_cap_n, 0.1, 100,
@@ -54,7 +56,12 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Number("safety.slew_limit_n_per_s", &safety.slew_limit_n_per_s, 10, 1e6,
                 "The displayed force does not change faster.");
   schema.Number("safety.speed_limit_m_per_s", &safety.speed_limit_m_per_s, 0.1, 100,
-                "A faster finger feels no force.");
+                "A faster finger feels no surface, only light damping.");
+  schema.Number("safety.light_damping_ns_per_m", &safety.light_damping_ns_per_m, 0, 20,
+                "Damping of a finger that is too fast, and of any while a lost world fades out.");
+  schema.Choice("safety.passivity_controller", &safety.passivity_controller,
+                {{"on", true}, {"off", false}},
+                "Whether energy that the rendering gives away is braked at once.");
   schema.Number("safety.soft_start_ms", &safety.soft_start_ms, 0, 5000,
                 "How long the force takes to come back after a world came or a fault went.");
   schema.Number("safety.fade_ms", &safety.fade_ms, 10, 100,
@@ -65,6 +72,17 @@ ConfigSchema DaemonSchema(Settings& settings) {
                 "No frame for so many world periods: the world is lost.");
   schema.Number("safety.lost_floor_ms", &safety.lost_floor_ms, 10, 2000,
                 "A silence shorter than this is never a loss.");
+
+  MappingSettings& mapping = settings.mapping;
+  schema.Vector("mapping.origin_mm", &mapping.origin_mm, -1e5, 1e5,
+                "Where the middle of the device lies in the world.");
+  schema.Vector(
+      "mapping.rotation_deg", &mapping.rotation_deg, -360, 360,
+      "Device axes in the world: roll, pitch and yaw about its fixed x, y and z, in turn.");
+  schema.Number("mapping.motion_scale", &mapping.motion_scale, 1e-3, 1e3,
+                "Metres in the world per metre of the device.");
+  schema.Number("mapping.force_scale", &mapping.force_scale, 1e-3, 1e3,
+                "Newtons at the device per newton in the world.");
 
   schema.Choice("device.kind", &settings.device.kind, {{"simulated", DeviceKind::kSimulated}},
                 "Which force display to drive.");
@@ -159,6 +177,10 @@ void RequireNotNegative(const std::string& key, double value) {
   }
 }
 
+void RequireFinite(const std::string& key, const Vec3& value) {
+  if (!value.allFinite()) throw std::invalid_argument(key + " must be finite");
+}
+
 }  // namespace
 
 std::int64_t Settings::period_ns() const {
@@ -197,14 +219,20 @@ void CheckSettings(const Settings& settings) {
   RequireNotNegative("render.stiffness_n_per_m", settings.render.stiffness_n_per_m);
   RequireNotNegative("render.damping_ns_per_m", settings.render.damping_ns_per_m);
   RequireNotNegative("render.finger_radius_mm", settings.render.finger_radius_mm);
+  RequirePositive("render.friction_stiffness_n_per_m", settings.render.friction_stiffness_n_per_m);
   RequirePositive("safety.force_cap_n", settings.safety.force_cap_n);
   RequirePositive("safety.slew_limit_n_per_s", settings.safety.slew_limit_n_per_s);
   RequirePositive("safety.speed_limit_m_per_s", settings.safety.speed_limit_m_per_s);
+  RequireNotNegative("safety.light_damping_ns_per_m", settings.safety.light_damping_ns_per_m);
   RequireNotNegative("safety.soft_start_ms", settings.safety.soft_start_ms);
   RequirePositive("safety.fade_ms", settings.safety.fade_ms);
   RequirePositive("safety.late_periods", settings.safety.late_periods);
   RequirePositive("safety.lost_periods", settings.safety.lost_periods);
   RequireNotNegative("safety.lost_floor_ms", settings.safety.lost_floor_ms);
+  RequirePositive("mapping.motion_scale", settings.mapping.motion_scale);
+  RequirePositive("mapping.force_scale", settings.mapping.force_scale);
+  RequireFinite("mapping.origin_mm", settings.mapping.origin_mm);
+  RequireFinite("mapping.rotation_deg", settings.mapping.rotation_deg);
   if (settings.period_ns() <= 0) throw std::invalid_argument("loop.rate_hz is too high");
   if (const auto conflict = FindConflict(settings)) {
     throw std::invalid_argument(conflict->key + ": " + conflict->why);

@@ -32,17 +32,30 @@ struct RenderSettings {
   DisplayRule display = DisplayRule::kInterpolate;
   PositionRule position_rule = PositionRule::kSecondOrder;  // of the local copies
   double finger_radius_mm = 10;
+  double friction_stiffness_n_per_m = 1000;  // of the stick spring, where surfaces have friction
 };
 
 struct SafetySettings {
   double force_cap_n = 10;
   double slew_limit_n_per_s = 5000;
   double speed_limit_m_per_s = 3;
+  double light_damping_ns_per_m = 1;  // of a finger that is too fast, and while a lost world fades
+  bool passivity_controller = false;
   double soft_start_ms = 200;  // the force grows over this after a world came
   double fade_ms = 80;         // ... and goes to zero over this when it is lost
   double late_periods = 2.5;   // no frame for this many world periods: hold
   double lost_periods = 5;     // ... for this many, and at least lost_floor_ms: lost
   double lost_floor_ms = 250;
+};
+
+/// How the device lies in the world: C = motion_scale R C_device + origin, f_device = force_scale
+/// R^T f_world. R turns about the fixed axes of the world: roll about x first, then pitch about y,
+/// then yaw about z.
+struct MappingSettings {
+  Vec3 origin_mm = Vec3::Zero();     // of the device, in the world
+  Vec3 rotation_deg = Vec3::Zero();  // roll pitch yaw
+  double motion_scale = 1;           // s_x, metres in the world per metre of the device
+  double force_scale = 1;            // s_f, newtons at the device per newton in the world
 };
 
 enum class DeviceKind { kSimulated };
@@ -86,6 +99,7 @@ struct Settings {
   LoopSettings loop;
   RenderSettings render;
   SafetySettings safety;
+  MappingSettings mapping;
   DeviceSettings device;
   HandSettings hand;
   SpidarSettings spidar;

@@ -7,11 +7,15 @@
 #include <span>
 
 #include "common/clock.h"
+#include "haptic_server/device/mapping.h"
 #include "haptic_server/render/contact_solve.h"
 #include "haptic_server/render/feature_track.h"
 #include "haptic_server/render/ledger.h"
 #include "haptic_server/render/local_bodies.h"
 #include "haptic_server/render/surface_force.h"
+#include "haptic_server/render/surface_motion.h"
+#include "haptic_server/safety/emergency_stop.h"
+#include "haptic_server/safety/energy_meter.h"
 #include "haptic_server/safety/peer_watch.h"
 #include "haptic_server/safety/safety_stage.h"
 
@@ -43,6 +47,18 @@ bool IsSound(const DeviceSample& sample) {
          sample.position.cwiseAbs().maxCoeff() <= kLargestCoordinate;
 }
 
+Vec3 Sum(std::span<const BodyShare> shares) {
+  Vec3 sum = Vec3::Zero();
+  for (const BodyShare& share : shares) sum += share.force;
+  return sum;
+}
+
+// How much of `whole` is left in `part`, 0..1.
+double Fraction(const Vec3& part, const Vec3& whole) {
+  const double square = whole.squaredNorm();
+  return square > 0 && std::isfinite(square) ? std::clamp(part.dot(whole) / square, 0.0, 1.0) : 0;
+}
+
 // Denormal numbers mean nothing in metres and cost a slow path in the processor.
 void FlushDenormals(Vec3& v) {
   for (double& x : v) {
@@ -58,22 +74,26 @@ struct HapticStep::State {
         period_ns(checked.period_ns()),
         radius(checked.render.finger_radius_mm * 1e-3),
         device(used_device),
+        mapping(checked.mapping),
         track(checked.render.display, period_ns),
         copies(period_ns, ReplayTicks(checked), own_epoch, checked.render.position_rule),
         surface_force(checked.render, Seconds(period_ns)),
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         peer(checked),
-        safety(checked) {
+        safety(checked),
+        energy(checked) {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
-    health.slew_limit = checked.safety.slew_limit_n_per_s;
+    health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
     const std::string name = device.Name();
     std::copy_n(name.begin(), std::min(name.size(), health.device.size() - 1),
                 health.device.begin());
   }
 
+  bool TakeSample(DeviceSample measured, bool clutched) noexcept;
   bool TakeFrame(const WorldInput& world) noexcept;
   void WatchWorld(const TickTime& time, const WorldInput& world, double speed) noexcept;
   std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
+  void Release() noexcept;
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
                protocol::HapticTick& message) noexcept;
 
@@ -81,29 +101,49 @@ struct HapticStep::State {
   const std::int64_t period_ns;
   const double radius;  // m
   Device& device;
+  Mapping mapping;
 
   FeatureTrack track;
   LocalBodies copies;
   SurfaceForce surface_force;
+  SurfaceMotion surface_motion;
   Ledger ledger;
   PeerWatch peer;
+  EmergencyStop emergency_stop;
   SafetyStage safety;
+  EnergyMeter energy;
 
   std::uint64_t tick = 0;
   std::int64_t start_ns = 0;
-  DeviceSample sample;             // the last sound one
+  DeviceSample sample;             // the last sound one, in W
   double penetration = 0;          // m, |e| of the tick before
+  double surface_work = 0;         // J, since then
+  double stored = 0;               // J, in the rendered springs
   std::uint64_t newest_epoch = 0;  // of the newest sound frame, and its number
   std::uint64_t newest_frame = 0;
   std::uint64_t shown_epoch = 0;  // whose surfaces are in the track; 0 = none
   std::uint64_t shown_frame = 0;
   std::uint64_t channel_epoch = 0;  // whose bodies the channels are about
   std::uint64_t missed_in_a_row = 0;
-  Vec3 displayed = Vec3::Zero();  // N
+  Vec3 displayed = Vec3::Zero();  // N, in W
   std::array<HalfSpace, kMaxContactPlanes> planes;
   std::array<BodyShare, kMaxShares> shares;
   protocol::HapticHealth health;
 };
+
+// Puts a measurement into the world. False, and nothing is taken, if it does not lie there. // RT:
+bool HapticStep::State::TakeSample(DeviceSample measured, bool clutched) noexcept {
+  const Vec3 position = measured.position;
+  measured.position = mapping.Follow(position, clutched);
+  measured.velocity = clutched ? Vec3(Vec3::Zero()) : mapping.VelocityInWorld(measured.velocity);
+  if (!IsSound(measured)) return false;
+  FlushDenormals(measured.position);
+  FlushDenormals(measured.velocity);
+  measured.target = mapping.PointInWorld(measured.target);
+  if (!measured.target.allFinite()) measured.target = measured.position;
+  sample = measured;
+  return true;
+}
 
 // Whether a new frame came that may be used, and books its ack if so. // RT:
 bool HapticStep::State::TakeFrame(const WorldInput& world) noexcept {
@@ -136,8 +176,7 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   if (state == PeerState::kAbsent && shown_epoch != 0) {
     track.Clear();
     copies.Clear();
-    surface_force.Reset();
-    penetration = 0;
+    Release();
     shown_epoch = shown_frame = 0;
   }
   if (fresh && peer.Accepts(world.epoch)) {
@@ -156,9 +195,18 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   }
 }
 
+// No contact in this tick. // RT:
+void HapticStep::State::Release() noexcept {
+  surface_force.Reset();
+  surface_motion.Reset();
+  penetration = 0;
+  surface_work = 0;
+  stored = 0;
+}
+
 // Contact solve and surface force at the last sound sample. Movable bodies without a channel are
 // left out.
-// // RT:
+// RT:
 std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
                                                      bool& no_channel) noexcept {
   const std::span<const Surface> surfaces = track.Surfaces(copies);
@@ -166,6 +214,9 @@ std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
   const ContactSolution contact =
       SolveContact(sample.position, radius, std::span(planes).first(surfaces.size()));
   penetration = contact.displacement.norm();
+  surface_work = surface_motion.Work(surfaces, displayed,
+                                     Seconds(period_ns) * static_cast<double>(elapsed_ticks));
+  surface_motion.Remember(surfaces, contact);
   std::size_t count = 0;
   for (const BodyShare& share : surface_force.Update(surfaces, contact, radius, elapsed_ticks)) {
     if (share.fixed || ledger.Open(share.body, share.generation, kPointer, tick)) {
@@ -174,7 +225,11 @@ std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
       no_channel = true;
     }
   }
+  const Vec3 as_sprung = Sum(std::span(shares).first(count));
   copies.SolveStiff(std::span(shares).first(count));
+  // What was solved together with its copy holds as much less: f^2/2k.
+  const double left = Fraction(Sum(std::span(shares).first(count)), as_sprung);
+  stored = left * left * surface_force.stored();
   return std::span(shares).first(count);
 }
 
@@ -190,7 +245,7 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   message.world_frame = shown_frame;
   message.stiffness = settings.render.stiffness_n_per_m;
   message.damping = settings.render.damping_ns_per_m;
-  message.force_cap = settings.safety.force_cap_n;
+  message.force_cap = settings.safety.force_cap_n * mapping.force_in_world();
   message.pointer_count = 1;
   protocol::Pointer& pointer = message.pointers[0];
   pointer = {};
@@ -221,6 +276,11 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   health.largest_force_step = std::max(health.largest_force_step, (force - displayed).norm());
   health.target = ToArray(sample.target);
   health.books = ledger.books();
+  health.energy = {.injected = energy.injected(),
+                   .dissipated = energy.dissipated(),
+                   .flagged = energy.times_flagged(),
+                   .unstable = energy.unstable() ? 1U : 0U,
+                   .controller = reason == ForceReason::kPassivity ? 1U : 0U};
   health.reconciliation = copies.reconciliation();
 
   displayed = force;
@@ -235,44 +295,64 @@ HapticStep::HapticStep(const Settings& settings, Device& device, std::uint64_t o
 
 HapticStep::~HapticStep() = default;
 
-void HapticStep::Tick(const TickTime& time, const WorldInput& world,
-                      protocol::HapticTick& message) noexcept {
+void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message,
+                      const OperatorInput& wish) noexcept {
   State& state = *state_;
   SafetyInput input;
-  DeviceSample sample;
-  input.device_ok = state.device.Read(time.start_ns, sample) == DeviceStatus::kOk;
-  input.sample_finite = input.device_ok && IsSound(sample);
-  if (input.sample_finite) {
-    FlushDenormals(sample.position);
-    FlushDenormals(sample.velocity);
-    if (!sample.target.allFinite()) sample.target = sample.position;
-    state.sample = sample;
-    input.speed = sample.velocity.stableNorm();
-  }
+  DeviceSample measured;
+  input.device_ok = state.device.Read(time.start_ns, measured) == DeviceStatus::kOk;
+  input.sample_finite =
+      input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
+  if (input.sample_finite) input.speed = measured.velocity.stableNorm();
 
-  state.WatchWorld(time, world, input.speed);
+  state.WatchWorld(time, world, input.sample_finite ? state.sample.velocity.stableNorm() : 0);
 
   const PeerState peer = state.peer.state();
+  input.stopped = state.emergency_stop.Update(wish.stop, wish.enable, measured.enabled);
+  input.clutched = wish.clutch;
   std::span<const BodyShare> shares;
-  if (input.sample_finite &&
+  Vec3 wanted = Vec3::Zero();
+  if (input.sample_finite && !input.stopped && !input.clutched &&
       (peer == PeerState::kLive || peer == PeerState::kLate || peer == PeerState::kLost)) {
     shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
-    for (const BodyShare& share : shares) input.wanted += share.force;
+    wanted = Sum(shares);
   } else {
-    state.surface_force.Reset();
-    state.penetration = 0;
+    state.Release();
+  }
+  const double energy_scale = state.mapping.energy_on_device();
+  if (input.sample_finite) {
+    state.energy.Measure({.position = measured.position,
+                          .velocity = measured.velocity,
+                          .duration_s = Seconds(time.previous_duration_ns),
+                          .surface_work = energy_scale * state.surface_work,
+                          .stored = energy_scale * state.stored,
+                          .penetration = state.penetration});
+    input.velocity = measured.velocity;
+    if (state.settings.safety.passivity_controller) input.brake = state.energy.Brake();
+  } else {
+    state.energy.Skip();
   }
 
+  input.wanted = state.mapping.ForceOnDevice(wanted);
   input.peer = peer;
   input.previous_duration_ns = time.previous_duration_ns;
   input.missed = time.missed;
-  Vec3 displayed = state.device.Write(state.safety.Limit(input));
-  if (!displayed.allFinite()) displayed.setZero();
-  state.safety.Displayed(displayed);
+  const Vec3 command = state.safety.Limit(input);
+  Vec3 on_device = Vec3::Zero();
+  if (input.stopped) {
+    state.device.Release();
+  } else {
+    on_device = state.device.Write(command);
+  }
+  if (!on_device.allFinite()) on_device.setZero();
+  state.safety.Displayed(on_device);
+  state.energy.Displayed(on_device, state.safety.ground(), input.wanted);
+  const Vec3 displayed = state.mapping.ForceInWorld(on_device);
 
   state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
                      .pointer = kPointer,
                      .displayed = displayed,
+                     .for_ground = state.mapping.ForceInWorld(state.safety.ground()),
                      .wanted = shares,
                      .finger = state.sample.position});
   state.copies.Step(state.tick, state.ledger.Booked(),
@@ -295,6 +375,7 @@ void HapticStep::Stop(std::int64_t now_ns, protocol::HapticTick& message) noexce
   state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
                      .pointer = kPointer,
                      .displayed = Vec3::Zero(),
+                     .for_ground = Vec3::Zero(),
                      .wanted = {},
                      .finger = state.sample.position});
   state.Publish(time, Vec3::Zero(), ForceReason::kStopped, message);

@@ -29,6 +29,13 @@ struct WorldInput {
       nullptr;  // the newest frame, if it was not handed over before
 };
 
+/// What an operator asks for in this tick, beside what the finger does.
+struct OperatorInput {
+  bool stop = false;    // emergency stop: minimum tension in this tick already, until enabled
+  bool enable = false;  // ends it, unless something asks for it in the same tick
+  bool clutch = false;  // the hand moves, the finger's point in the world stays, without force
+};
+
 /// The haptic loop's state between ticks. Everything is allocated by the constructor.
 class HapticStep {
  public:
@@ -41,7 +48,8 @@ class HapticStep {
   HapticStep& operator=(const HapticStep&) = delete;
 
   /// Runs one tick and fills the message to publish. // RT: no allocation, lock, log or throw.
-  void Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message) noexcept;
+  void Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message,
+            const OperatorInput& wish = {}) noexcept;
 
   /// Zero force and minimum tension at `now_ns`, until when the force of the last tick was held; the
   /// message says kStopped. // RT:

@@ -105,6 +105,7 @@ constexpr std::uint32_t kHapticHealth =
     Measure<HapticHealth>([](auto& a, auto& m) { HapticHealthFields(a, m); });
 constexpr std::uint32_t kReconciliation =
     Measure<Reconciliation>([](auto& a, auto& m) { ReconciliationFields(a, m); });
+constexpr std::uint32_t kEnergy = Measure<Energy>([](auto& a, auto& m) { EnergyFields(a, m); });
 constexpr std::uint32_t kSceneHead =
     Measure<WorldSceneHeadRecord>([](auto& a, auto& m) { WorldSceneHead(a, m); });
 constexpr std::uint32_t kSceneBody =
@@ -123,7 +124,7 @@ static_assert(kWorldFrameBytes ==
               kFrameHead +
                   kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery + kMobility) +
                   kLocalHead + kMaxLocalBodies * (kLocalBody + kMaxContactPlanes * kContactPlane));
-static_assert(kHapticHealthBytes == kHapticHealth + kReconciliation);
+static_assert(kHapticHealthBytes == kHapticHealth + kReconciliation + kEnergy);
 static_assert(WorldSceneBytes(3, 5, 7) ==
               kSceneHead + 3 * kSceneBody + 5 * kSceneCollider + 7 * kSceneMesh);
 static_assert(kWorldHealthBytes ==
@@ -134,8 +135,8 @@ static_assert(kTickHead % 8 == 0 && kPointer % 8 == 0 && kRotation % 8 == 0 && k
               kBodiesHead % 8 == 0 && kBody % 8 == 0 && kVelocity % 8 == 0 && kFriction % 8 == 0 &&
               kRecovery % 8 == 0 && kMobility % 8 == 0 && kLocalHead % 8 == 0 &&
               kLocalBody % 8 == 0 && kContactPlane % 8 == 0 && kHapticHealth % 8 == 0 &&
-              kReconciliation % 8 == 0 && kSceneHead % 8 == 0 && kSceneBody % 8 == 0 &&
-              kSceneCollider % 8 == 0 && kSceneMesh % 8 == 0);
+              kReconciliation % 8 == 0 && kEnergy % 8 == 0 && kSceneHead % 8 == 0 &&
+              kSceneBody % 8 == 0 && kSceneCollider % 8 == 0 && kSceneMesh % 8 == 0);
 
 // Encode copies contact planes in one piece, since the largest frame has 64 of them.
 static_assert(sizeof(ContactPlane) == kContactPlane && offsetof(ContactPlane, point) == 8 &&
@@ -162,6 +163,11 @@ std::uint32_t FrameBytes(std::uint32_t planes, std::uint32_t blocks) {
 }
 constexpr std::uint32_t kFrameBlocks = kFrameSurfaces | kFrameVelocities | kFrameFriction |
                                        kFrameRecovery | kFrameLocalBodies | kFrameMobility;
+
+std::uint32_t HealthBytes(std::uint32_t blocks) {
+  return kHapticHealth + ((blocks & kHealthReconciliation) != 0 ? kReconciliation : 0) +
+         ((blocks & kHealthEnergy) != 0 ? kEnergy : 0);
+}
 
 /// Both the copy and the message, as it says of itself, reach this far.
 bool Reaches(std::span<const std::uint64_t> words, Encoded encoded, std::uint64_t bytes) {
@@ -338,24 +344,34 @@ DecodeStatus Decode(std::span<const std::uint64_t> words, Encoded encoded,
 }
 
 Encoded Encode(const HapticHealth& m, std::span<std::uint64_t> words) noexcept {
-  const std::uint32_t blocks = m.reconciliation.frames != 0 ? kHealthReconciliation : 0;
-  const std::uint32_t bytes = kHapticHealth + (blocks != 0 ? kReconciliation : 0);
+  const Energy& e = m.energy;
+  std::uint32_t blocks = m.reconciliation.frames != 0 ? kHealthReconciliation : 0;
+  if (e.injected != 0 || e.dissipated != 0 || e.flagged != 0 || e.unstable != 0 ||
+      e.controller != 0) {
+    blocks |= kHealthEnergy;
+  }
+  const std::uint32_t bytes = HealthBytes(blocks);
   if (bytes > words.size_bytes()) return {};
   Encoder encoder(words);
   HapticHealthFields(encoder, m);
-  if (blocks != 0) ReconciliationFields(encoder, m.reconciliation);
+  if ((blocks & kHealthReconciliation) != 0) ReconciliationFields(encoder, m.reconciliation);
+  if ((blocks & kHealthEnergy) != 0) EnergyFields(encoder, m.energy);
   return {bytes, blocks};
 }
 
 DecodeStatus Decode(std::span<const std::uint64_t> words, Encoded encoded,
                     HapticHealth& message) noexcept {
-  const bool reconciled = (encoded.blocks & kHealthReconciliation) != 0;
-  const std::uint32_t bytes = kHapticHealth + (reconciled ? kReconciliation : 0);
-  if (!LengthAgrees(words, encoded, bytes, kHealthReconciliation)) return DecodeStatus::kLength;
+  if (!LengthAgrees(words, encoded, HealthBytes(encoded.blocks),
+                    kHealthReconciliation | kHealthEnergy)) {
+    return DecodeStatus::kLength;
+  }
   HapticHealth m;
   Decoder decoder(words);
   HapticHealthFields(decoder, m);
-  if (reconciled) ReconciliationFields(decoder, m.reconciliation);
+  if ((encoded.blocks & kHealthReconciliation) != 0) {
+    ReconciliationFields(decoder, m.reconciliation);
+  }
+  if ((encoded.blocks & kHealthEnergy) != 0) EnergyFields(decoder, m.energy);
   const DecodeStatus status = Validate(m);
   if (status == DecodeStatus::kOk) message = m;
   return status;

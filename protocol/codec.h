@@ -32,12 +32,13 @@ inline constexpr std::uint32_t kFrameRecovery = 8;    // of each plane
 inline constexpr std::uint32_t kFrameLocalBodies = 16;
 inline constexpr std::uint32_t kFrameMobility = 32;  // of each plane
 inline constexpr std::uint32_t kHealthReconciliation = 1;
+inline constexpr std::uint32_t kHealthEnergy = 2;
 inline constexpr std::uint32_t kSceneMeshes = 1;
 
 // Room for the largest message of each stream [bytes].
 inline constexpr std::uint32_t kHapticTickBytes =
     80 + kMaxPointers * (88 + 80) + kMaxChannels * 144 + 48;
-inline constexpr std::uint32_t kHapticHealthBytes = 328 + 2 * 8 * kHistogramBuckets + 24;
+inline constexpr std::uint32_t kHapticHealthBytes = 328 + 2 * 8 * kHistogramBuckets + 24 + 32;
 inline constexpr std::uint32_t kWorldFrameBytes = 104 + kMaxPlanes * (64 + 16 + 24 + 16 + 8 + 8) +
                                                   16 +
                                                   kMaxLocalBodies * (224 + kMaxContactPlanes * 136);

@@ -195,6 +195,15 @@ constexpr void ReconciliationFields(Archive& archive, R& r) {
   archive("largest_jump", r.largest_jump);
 }
 
+template <typename Archive, typename E>
+constexpr void EnergyFields(Archive& archive, E& e) {
+  archive("injected", e.injected);
+  archive("dissipated", e.dissipated);
+  archive("flagged", e.flagged);
+  archive("unstable", e.unstable);
+  archive("controller", e.controller);
+}
+
 template <typename Archive, typename Message>
 constexpr void WorldHealthFields(Archive& archive, Message& m) {
   archive("frames", m.frames);

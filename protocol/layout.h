@@ -164,6 +164,7 @@ constexpr void WriteLayout(Sink& sink) {
   const auto local_body = [](auto& a, const LocalBody& b) { LocalBodyFields(a, b); };
   const auto contact = [](auto& a, const ContactPlane& c) { ContactPlaneFields(a, c); };
   const auto reconciliation = [](auto& a, const Reconciliation& r) { ReconciliationFields(a, r); };
+  const auto energy = [](auto& a, const Energy& e) { EnergyFields(a, e); };
   const auto scene = [](auto& a, const WorldSceneHeadRecord& h) { WorldSceneHead(a, h); };
   const auto scene_body = [](auto& a, const SceneBody& b) { SceneBodyFields(a, b); };
   const auto collider = [](auto& a, const SceneCollider& c) { SceneColliderFields(a, c); };
@@ -179,6 +180,7 @@ constexpr void WriteLayout(Sink& sink) {
   record("haptic.tick/ground", ground, GroundChannel{});
   record("haptic.health", haptic_health, HapticHealth{});
   record("haptic.health/reconciliation", reconciliation, Reconciliation{});
+  record("haptic.health/energy", energy, Energy{});
   record("world.frame", frame, WorldFrame{});
   record("world.frame/plane", plane, Plane{});
   record("world.frame/plane_surface", surface, Plane{});

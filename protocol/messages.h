@@ -38,14 +38,8 @@ enum class StreamType : std::uint32_t {
 
 /// How often a stream's payload has grown since its first version. SPEC.md 3.2, 8.1.
 constexpr std::uint16_t TypeVersion(StreamType type) {
-  switch (type) {
-    case StreamType::kWorldFrame:
-      return 3;
-    case StreamType::kHapticHealth:
-      return 2;
-    default:
-      return 1;
-  }
+  const bool grew_twice = type == StreamType::kWorldFrame || type == StreamType::kHapticHealth;
+  return grew_twice ? 3 : 1;
 }
 
 /// Why the displayed force is what it is. The numbers are wire format: append only.
@@ -65,6 +59,9 @@ enum class ForceReason : std::uint32_t {
   kDeviceFault = 12,    // the device does not answer: zero
   kLoopFault = 13,      // too many deadlines missed in a row: zero until re-armed
   kStopped = 14,        // the daemon is stopping: released
+  kEmergencyStop = 15,  // stopped by an operator or the device's enable input: zero until enabled
+  kPassivity = 16,      // as rendered, and the passivity controller brakes
+  kClutched = 17,       // the finger is disengaged from the world: zero
 };
 
 /// How impulses act on the world, chosen by the world. design decision 3.
@@ -246,6 +243,15 @@ struct Reconciliation {
   double largest_jump = 0;   // m, since the start
 };
 
+/// What the energy meter of the haptic side finds, at the device. numerics 2.
+struct Energy {
+  double injected = 0;  // J, given to the hand beyond the work of bodies that moved; < 0: absorbed
+  double dissipated = 0;         // J, by the device's own friction
+  std::uint64_t flagged = 0;     // how often a contact was found unstable
+  std::uint32_t unstable = 0;    // 1: the present contact is
+  std::uint32_t controller = 0;  // 1: the passivity controller brakes now
+};
+
 struct HapticHealth {
   std::uint64_t ticks = 0;
   std::uint64_t period_ns = 0;
@@ -270,6 +276,7 @@ struct HapticHealth {
   Histogram lateness{};           // of the wake-up against the schedule, ns
   Histogram duration{};           // of the tick's work, ns
   Reconciliation reconciliation{};
+  Energy energy{};
 };
 
 /// Why a world did not apply an impulse.

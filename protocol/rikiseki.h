@@ -9,7 +9,7 @@
  *   own side   rk_create, rk_writer_of;  each tick: rk_encode_*, rk_publish, rk_heartbeat, rk_report;
  *              rk_close
  *   other side rk_attach (every 100 ms while detached, not in a thread with deadlines),
- *              rk_reader_of;  each tick: rk_state, rk_read_*, rk_decode_*, rk_accept;
+ *              rk_reader_of;  each tick: rk_state, rk_read_*, rk_jumped, rk_decode_*, rk_accept;
  *              every 100 ms: rk_owner_alive, rk_replaced;  rk_detach
  *
  * Nothing here allocates memory. rk_publish, rk_read_*, rk_encode_*, rk_decode_*, rk_state and
@@ -55,8 +55,8 @@
  * Constants */
 
 #define RK_VERSION_MAJOR 0
-#define RK_VERSION_MINOR 2
-#define RK_LAYOUT_HASH UINT64_C(0xE6EFB47136B26316) /* 8.3 */
+#define RK_VERSION_MINOR 3
+#define RK_LAYOUT_HASH UINT64_C(0x2C03F6A567697CB9) /* 8.3 */
 
 #define RK_MAGIC UINT64_C(0x494B4553494B4952) /* "RIKISEKI" */
 #define RK_BYTE_ORDER UINT32_C(0x01020304)
@@ -73,7 +73,8 @@
 #define RK_MAX_LOCAL_BODIES 4u
 #define RK_MAX_CONTACT_PLANES 16u /* of one local body */
 #define RK_MAX_BODIES 10000u
-#define RK_IMPULSE_UNIT 1e-12 /* N s, N m s: 7.1 */
+#define RK_IMPULSE_UNIT 1e-12       /* N s, N m s: 7.1 */
+#define RK_MOBILITY_NOT_SAID (-1.0) /* of a plane, 6.2 */
 
 enum rk_role { RK_HAPTIC = 1, RK_WORLD = 2 };
 enum rk_segment_state {
@@ -108,7 +109,10 @@ enum rk_reason { /* 6.6 */
                  RK_NO_CHANNEL = 11,
                  RK_DEVICE_FAULT = 12,
                  RK_LOOP_FAULT = 13,
-                 RK_STOPPED = 14
+                 RK_STOPPED = 14,
+                 RK_EMERGENCY_STOP = 15,
+                 RK_PASSIVITY = 16,
+                 RK_CLUTCHED = 17
 };
 
 /* Block bits. */
@@ -119,7 +123,9 @@ enum rk_reason { /* 6.6 */
 #define RK_FRAME_FRICTION 4u
 #define RK_FRAME_RECOVERY 8u
 #define RK_FRAME_LOCAL_BODIES 16u
+#define RK_FRAME_MOBILITY 32u
 #define RK_HEALTH_RECONCILIATION 1u
+#define RK_HEALTH_ENERGY 2u
 #define RK_SCENE_MESHES 1u
 
 /* ---------------------------------------------------------------------------------------------
@@ -294,7 +300,12 @@ typedef struct rk_contact_plane { /* world.frame/contact_plane */
   double other_velocity[3];
   double other_inverse_mass;
   double impulse[3];
+  double radius;
 } rk_contact_plane;
+
+typedef struct rk_plane_mobility { /* world.frame/plane_mobility */
+  double inverse_mass;             /* 1/kg; 0 = it cannot move; RK_MOBILITY_NOT_SAID */
+} rk_plane_mobility;
 
 typedef struct rk_scheduling {
   uint32_t policy;
@@ -341,6 +352,14 @@ typedef struct rk_reconciliation { /* haptic.health/reconciliation */
   double newest_jump;
   double largest_jump;
 } rk_reconciliation;
+
+typedef struct rk_energy { /* haptic.health/energy */
+  double injected;
+  double dissipated;
+  uint64_t flagged;
+  uint32_t unstable;
+  uint32_t controller;
+} rk_energy;
 
 typedef struct rk_discarded {
   int64_t gap[3];
@@ -470,10 +489,13 @@ RK_SIZE(rk_local_body, 224);
 RK_AT(rk_local_body, mass, 16);
 RK_AT(rk_local_body, orientation, 96);
 RK_AT(rk_local_body, angular_acceleration, 200);
-RK_SIZE(rk_contact_plane, 128);
+RK_SIZE(rk_contact_plane, 136);
 RK_AT(rk_contact_plane, gap, 56);
 RK_AT(rk_contact_plane, impulse, 104);
+RK_AT(rk_contact_plane, radius, 128);
+RK_SIZE(rk_plane_mobility, 8);
 RK_SIZE(rk_reconciliation, 24);
+RK_SIZE(rk_energy, 32);
 RK_SIZE(rk_scene_head, 120);
 RK_SIZE(rk_scene_body, 80);
 RK_SIZE(rk_scene_collider, 120);
@@ -490,6 +512,7 @@ typedef struct rk_tick {
   rk_ground ground;
 } rk_tick;
 
+/* rk_frame_init first: a frame that is all zero says of every plane that its body cannot move. */
 typedef struct rk_frame {
   rk_frame_head head;
   rk_plane plane[RK_MAX_PLANES];
@@ -500,6 +523,7 @@ typedef struct rk_frame {
   rk_local_head local;
   rk_local_body local_body[RK_MAX_LOCAL_BODIES];
   rk_contact_plane contact[RK_MAX_LOCAL_BODIES][RK_MAX_CONTACT_PLANES]; /* of local_body[i] */
+  rk_plane_mobility mobility[RK_MAX_PLANES];                            /* of plane[i] */
 } rk_frame;
 
 /* Room for the largest message of a stream. */
@@ -507,16 +531,17 @@ typedef struct rk_frame {
   ((uint32_t)(sizeof(rk_tick_head) +                                                 \
               RK_MAX_POINTERS * (sizeof(rk_pointer) + sizeof(rk_pointer_rotation)) + \
               RK_MAX_CHANNELS * sizeof(rk_channel) + sizeof(rk_ground)))
-#define RK_FRAME_BYTES                                                                       \
-  ((uint32_t)(sizeof(rk_frame_head) +                                                        \
-              RK_MAX_PLANES *                                                                \
-                  (sizeof(rk_plane) + sizeof(rk_plane_surface) + sizeof(rk_plane_velocity) + \
-                   sizeof(rk_plane_friction) + sizeof(rk_plane_recovery)) +                  \
-              sizeof(rk_local_head) +                                                        \
-              RK_MAX_LOCAL_BODIES *                                                          \
+#define RK_FRAME_BYTES                                                                  \
+  ((uint32_t)(sizeof(rk_frame_head) +                                                   \
+              RK_MAX_PLANES * (sizeof(rk_plane) + sizeof(rk_plane_surface) +            \
+                               sizeof(rk_plane_velocity) + sizeof(rk_plane_friction) +  \
+                               sizeof(rk_plane_recovery) + sizeof(rk_plane_mobility)) + \
+              sizeof(rk_local_head) +                                                   \
+              RK_MAX_LOCAL_BODIES *                                                     \
                   (sizeof(rk_local_body) + RK_MAX_CONTACT_PLANES * sizeof(rk_contact_plane))))
 #define RK_FRAME_ROOM (16384u - 32u) /* 6.2-2: what a frame's slot should have room for */
-#define RK_HAPTIC_HEALTH_BYTES ((uint32_t)(sizeof(rk_haptic_health) + sizeof(rk_reconciliation)))
+#define RK_HAPTIC_HEALTH_BYTES \
+  ((uint32_t)(sizeof(rk_haptic_health) + sizeof(rk_reconciliation) + sizeof(rk_energy)))
 
 /* What stands beside a payload. */
 typedef struct rk_received {
@@ -576,6 +601,11 @@ static inline void rk_tick_init(rk_tick* m) {
   for (size_t i = 0; i < RK_MAX_POINTERS; ++i) m->rotation[i].orientation[0] = 1;
 }
 
+static inline void rk_frame_init(rk_frame* m) {
+  memset(m, 0, sizeof *m);
+  for (size_t i = 0; i < RK_MAX_PLANES; ++i) m->mobility[i].inverse_mass = RK_MOBILITY_NOT_SAID;
+}
+
 /* Does the message say only what section 6 allows? Renormalises orientations. */
 static inline enum rk_verdict rk_check_tick(rk_tick* m) {
   uint32_t seen = 0;
@@ -596,7 +626,7 @@ static inline enum rk_verdict rk_check_tick(rk_tick* m) {
     double norm;
     if (p->pointer >= RK_MAX_POINTERS || (seen & (1u << p->pointer)) != 0) return RK_BAD_IDENTITY;
     seen |= 1u << p->pointer;
-    if (p->reason > RK_STOPPED) return RK_BAD_ENUMERATOR;
+    if (p->reason > RK_CLUTCHED) return RK_BAD_ENUMERATOR;
     if (!rk_finite(&p->radius, 1) || !rk_finite(p->position, 3) || !rk_finite(p->velocity, 3) ||
         !rk_finite(p->force, 3) || !rk_finite(r->orientation, 4) ||
         !rk_finite(r->angular_velocity, 3) || !rk_finite(r->torque, 3)) {
@@ -640,12 +670,16 @@ static inline enum rk_verdict rk_check_local_body(rk_local_body* b, rk_contact_p
   for (uint32_t i = 0; i < b->contact_count; ++i) {
     rk_contact_plane* c = &contacts[i];
     if (!rk_finite_span(c, offsetof(rk_contact_plane, point), sizeof *c)) return RK_BAD_NUMBER;
-    if (c->friction < 0 || c->other_inverse_mass < 0) return RK_BAD_RANGE;
+    if (c->friction < 0 || c->other_inverse_mass < 0 || c->radius < 0) return RK_BAD_RANGE;
     norm = rk_normalise(c->normal, 3);
     if (!isfinite(norm)) return RK_BAD_NUMBER;
     if (!(norm > 1e-12)) return RK_BAD_NORMAL;
   }
   return RK_SOUND;
+}
+
+static inline int rk_is_not_said(double inverse_mass) { /* exactly */
+  return inverse_mass >= RK_MOBILITY_NOT_SAID && inverse_mass <= RK_MOBILITY_NOT_SAID;
 }
 
 /* Likewise; renormalises normals. */
@@ -659,15 +693,16 @@ static inline enum rk_verdict rk_check_frame(rk_frame* m) {
     const rk_plane_surface* s = &m->surface[i];
     const rk_plane_friction* f = &m->friction[i];
     const double recovery_s = m->recovery[i].recovery_s;
+    const double inverse_mass = m->mobility[i].inverse_mass;
     double norm;
     if (p->pointer >= RK_MAX_POINTERS) return RK_BAD_IDENTITY;
     if (!rk_finite(p->point, 3) || !rk_finite_span(s, 0, sizeof *s) ||
         !rk_finite(m->velocity[i].velocity, 3) || !rk_finite_span(f, 0, sizeof *f) ||
-        !isfinite(recovery_s)) {
+        !isfinite(recovery_s) || !isfinite(inverse_mass)) {
       return RK_BAD_NUMBER;
     }
     if (s->stiffness < 0 || s->damping < 0 || f->static_friction < 0 || f->dynamic_friction < 0 ||
-        recovery_s < 0 || recovery_s > 10) {
+        recovery_s < 0 || recovery_s > 10 || (inverse_mass < 0 && !rk_is_not_said(inverse_mass))) {
       return RK_BAD_RANGE;
     }
     norm = rk_normalise(p->normal, 3);
@@ -773,6 +808,13 @@ static inline int rk_any(const void* records, size_t bytes) { /* a value that is
   return 0;
 }
 
+static inline int rk_any_mobility(const rk_frame* m) {
+  for (uint32_t i = 0; i < m->head.plane_count; ++i) {
+    if (!rk_is_not_said(m->mobility[i].inverse_mass)) return 1;
+  }
+  return 0;
+}
+
 /* Room for RK_FRAME_BYTES. */
 static inline int rk_encode_frame(const rk_frame* m, uint64_t* words, rk_received* shape) {
   const size_t planes = m->head.plane_count;
@@ -787,6 +829,7 @@ static inline int rk_encode_frame(const rk_frame* m, uint64_t* words, rk_receive
   if (rk_any(m->velocity, planes * sizeof m->velocity[0])) blocks |= RK_FRAME_VELOCITIES;
   if (rk_any(m->friction, planes * sizeof m->friction[0])) blocks |= RK_FRAME_FRICTION;
   if (rk_any(m->recovery, planes * sizeof m->recovery[0])) blocks |= RK_FRAME_RECOVERY;
+  if (rk_any_mobility(m)) blocks |= RK_FRAME_MOBILITY;
   rk_put(words, &at, &m->head, sizeof m->head);
   rk_put(words, &at, m->plane, planes * sizeof m->plane[0]);
   if ((blocks & RK_FRAME_SURFACES) != 0) {
@@ -807,6 +850,9 @@ static inline int rk_encode_frame(const rk_frame* m, uint64_t* words, rk_receive
     for (uint32_t i = 0; i < bodies; ++i) {
       rk_put(words, &at, m->contact[i], m->local_body[i].contact_count * sizeof m->contact[0][0]);
     }
+  }
+  if ((blocks & RK_FRAME_MOBILITY) != 0) {
+    rk_put(words, &at, m->mobility, planes * sizeof m->mobility[0]);
   }
   shape->used_bytes = at;
   shape->blocks = blocks;
@@ -842,13 +888,13 @@ static inline enum rk_verdict rk_decode_local(const uint64_t* words, uint32_t en
 static inline enum rk_verdict rk_decode_frame(const uint64_t* words, size_t room_bytes,
                                               const rk_received* r, rk_frame* m) {
   const uint32_t known = RK_FRAME_SURFACES | RK_FRAME_VELOCITIES | RK_FRAME_FRICTION |
-                         RK_FRAME_RECOVERY | RK_FRAME_LOCAL_BODIES;
+                         RK_FRAME_RECOVERY | RK_FRAME_LOCAL_BODIES | RK_FRAME_MOBILITY;
   const uint32_t end = r->used_bytes < room_bytes ? r->used_bytes : (uint32_t)room_bytes;
   rk_frame copy;
   size_t planes;
   uint32_t at = 0;
   enum rk_verdict verdict = RK_SOUND;
-  memset(&copy, 0, sizeof copy);
+  rk_frame_init(&copy);
   if (!rk_take(words, end, &at, &copy.head, sizeof copy.head)) return RK_BAD_LENGTH;
   planes = copy.head.plane_count;
   if (planes > RK_MAX_PLANES) return RK_BAD_COUNT;
@@ -864,6 +910,10 @@ static inline enum rk_verdict rk_decode_frame(const uint64_t* words, size_t room
     return RK_BAD_LENGTH;
   }
   if ((r->blocks & RK_FRAME_LOCAL_BODIES) != 0) verdict = rk_decode_local(words, end, &at, &copy);
+  if (verdict == RK_SOUND && (r->blocks & RK_FRAME_MOBILITY) != 0 &&
+      !rk_take(words, end, &at, copy.mobility, planes * sizeof copy.mobility[0])) {
+    verdict = RK_BAD_LENGTH;
+  }
   if (verdict == RK_SOUND && !rk_length_agrees(r, at, room_bytes, known)) verdict = RK_BAD_LENGTH;
   if (verdict == RK_SOUND) verdict = rk_check_frame(&copy);
   if (verdict == RK_SOUND) *m = copy;
@@ -914,6 +964,8 @@ typedef struct rk_reader {
   uint64_t retries;                     /* copies thrown away */
   uint64_t rejected, rejected_in_a_row; /* by rk_accept */
   uint64_t stamp_ns;                    /* of the message accepted last */
+  uint64_t period_ns;                   /* of the directory; 0 = aperiodic */
+  uint64_t looked, looked_ns;           /* what rk_jumped saw last, and when; 0 = nothing yet */
 } rk_reader;
 
 enum rk_read_status {
@@ -989,6 +1041,17 @@ static inline enum rk_verdict rk_accept(rk_reader* r, const rk_received* receive
     ++r->rejected_in_a_row;
   }
   return verdict;
+}
+
+/* Has the counter grown faster than a writer of this period can be meant to? Ask after every read that
+ * brought a message; then detach, as for RK_BACKWARDS. 9.2-9 */
+static inline int rk_jumped(rk_reader* r, uint64_t now_ns) {
+  const int first = r->looked_ns == 0;
+  const uint64_t grown = r->cursor - r->looked;
+  const uint64_t periods = first || r->period_ns == 0 ? 0 : (now_ns - r->looked_ns) / r->period_ns;
+  r->looked = r->cursor;
+  r->looked_ns = now_ns;
+  return !first && r->period_ns != 0 && grown / 4 > periods + r->slot_count;
 }
 
 /* Ten rejections in a row, or RK_BACKWARDS: detach until the object changes. 9.2-6 */
@@ -1307,6 +1370,7 @@ static inline int rk_reader_of(const rk_view* view, uint32_t type_id, rk_reader*
   reader->slot_stride = e->slot_stride;
   reader->slot_count = e->slot_count;
   reader->payload_bytes = e->payload_bytes;
+  reader->period_ns = e->period_ns;
   return 1;
 }
 
@@ -1427,6 +1491,10 @@ static inline int rk_supersede(rk_segment* own, uint64_t* epoch) {
   return 0;
 }
 
+static inline uint16_t rk_type_version(uint32_t type_id) { /* 6 */
+  return type_id == RK_WORLD_FRAME || type_id == RK_HAPTIC_HEALTH ? 3 : 1;
+}
+
 /* Fills the private directory; the size of the whole segment, 0 if the streams cannot be. */
 static inline uint64_t rk_arrange(const rk_stream_spec* streams, uint32_t count,
                                   rk_stream_entry* entries) {
@@ -1442,7 +1510,7 @@ static inline uint64_t rk_arrange(const rk_stream_spec* streams, uint32_t count,
     }
     memset(e, 0, sizeof *e);
     e->type_id = s->type_id;
-    e->type_version = s->type_id == RK_WORLD_FRAME || s->type_id == RK_HAPTIC_HEALTH ? 2 : 1;
+    e->type_version = rk_type_version(s->type_id);
     e->cursor_offset = RK_HEADER_BYTES + (uint64_t)RK_LINE_BYTES * i;
     e->ring_offset = ring;
     e->slot_stride = (s->payload_bytes + 32u + RK_LINE_BYTES - 1u) / RK_LINE_BYTES * RK_LINE_BYTES;

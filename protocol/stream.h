@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "protocol/codec.h"
@@ -15,13 +16,17 @@ namespace rikiseki::protocol {
 /// How many refusals of a stream's messages in a row end in detaching. SPEC.md 9.2.
 inline constexpr std::uint32_t kRejectionsBeforeDetach = 10;
 
-template <typename Message>
-class MessageWriter {
+/// Messages as large as `Words` has room for.
+template <typename Message, typename Words>
+class WordsWriter {
  public:
-  MessageWriter() = default;
-  explicit MessageWriter(const StreamWriter& writer) noexcept : writer_(writer) {}
+  WordsWriter() = default;
+  explicit WordsWriter(const StreamWriter& writer) : writer_(writer) {
+    if constexpr (requires { words_.resize(0); }) words_.resize(writer.payload_bytes() / 8);
+  }
 
-  /// False, and nothing is published, for a message with impossible counts. // RT:
+  /// False, and nothing is published, for a message with impossible counts, or for one that is more
+  /// than the stream was made for. // RT:
   bool Publish(const Message& message, std::uint64_t stamp_ns) noexcept {
     const Encoded encoded = Encode(message, std::span<std::uint64_t>(words_));
     if (encoded.used_bytes == 0) return false;
@@ -33,30 +38,41 @@ class MessageWriter {
 
  private:
   StreamWriter writer_;
-  std::array<std::uint64_t, StreamOf<Message>::kBytes / 8> words_{};
+  Words words_{};
 };
+
+template <typename Message>
+using MessageWriter =
+    WordsWriter<Message, std::array<std::uint64_t, StreamOf<Message>::kBytes / 8>>;
+/// world.bodies and world.scene, whose size the scene decides; the latter is published when a scene
+/// was loaded, not every tick.
+using BodiesWriter = WordsWriter<std::span<const Body>, std::vector<std::uint64_t>>;
+using SceneWriter = WordsWriter<WorldScene, std::vector<std::uint64_t>>;
 
 /// A reader that has no clock asks with this: stamps and counters are then not held against one.
 inline constexpr std::uint64_t kNoClock = ~std::uint64_t{0};
 /// How far in the future a stamp may lie. SPEC.md 9.2-8.
 inline constexpr std::uint64_t kStampSlackNs = 1'000'000;
 
-template <typename Message>
-class MessageReader {
+/// Reads a stream into `Words`, and judges what it reads: stamps, counters, and what Decode says.
+template <typename Words>
+class WordsReader {
  public:
-  MessageReader() = default;
+  WordsReader() = default;
   /// `period_ns`: of the stream's directory; 0 = aperiodic.
-  explicit MessageReader(const StreamReader& reader, std::uint64_t period_ns = 0) noexcept
-      : reader_(reader), period_ns_(period_ns) {}
+  WordsReader(const StreamReader& reader, std::uint64_t period_ns, Words words = {})
+      : reader_(reader), period_ns_(period_ns), words_(std::move(words)) {}
 
-  /// Unless kFresh, `message` is untouched. `now_ns`: CLOCK_MONOTONIC just before the call. // RT:
-  ReadStatus ReadLatest(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+  /// `decode(words, encoded)` leaves what it fills untouched unless kOk. // RT:
+  template <typename DecodeFunction>
+  ReadStatus ReadLatest(std::uint64_t now_ns, DecodeFunction&& decode) {
     if (hopeless()) return ReadStatus::kEmpty;
-    return Accept(reader_.ReadLatest(words_, received_), message, now_ns);
+    return Accept(reader_.ReadLatest(words_, received_), now_ns, decode);
   }
-  ReadStatus ReadNext(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+  template <typename DecodeFunction>
+  ReadStatus ReadNext(std::uint64_t now_ns, DecodeFunction&& decode) {
     if (hopeless()) return ReadStatus::kEmpty;
-    return Accept(reader_.ReadNext(words_, received_), message, now_ns);
+    return Accept(reader_.ReadNext(words_, received_), now_ns, decode);
   }
 
   const StreamReader& ring() const noexcept { return reader_; }
@@ -72,7 +88,8 @@ class MessageReader {
   }
 
  private:
-  ReadStatus Accept(ReadStatus status, Message& message, std::uint64_t now_ns) noexcept {
+  template <typename DecodeFunction>
+  ReadStatus Accept(ReadStatus status, std::uint64_t now_ns, DecodeFunction& decode) {
     if (status == ReadStatus::kFresh && Jumped(now_ns)) status = ReadStatus::kBackwards;
     if (status == ReadStatus::kBackwards) backwards_ = true;
     if (status == ReadStatus::kRejected) {
@@ -80,7 +97,8 @@ class MessageReader {
     } else if (status == ReadStatus::kFresh && !StampIsSound(now_ns)) {
       refusal_ = DecodeStatus::kStamp;
     } else if (status == ReadStatus::kFresh) {
-      refusal_ = Decode(words_, {received_.used_bytes, received_.blocks}, message);
+      refusal_ = decode(std::span<const std::uint64_t>(words_),
+                        Encoded{received_.used_bytes, received_.blocks});
       if (refusal_ == DecodeStatus::kOk) {
         rejected_in_a_row_ = 0;
         stamp_ns_ = received_.stamp_ns;
@@ -116,7 +134,7 @@ class MessageReader {
   std::uint64_t looked_ns_ = 0;  // when the newest message came; 0 = none yet
   std::uint64_t looked_number_ = 0;
   std::uint64_t stamp_ns_ = 0;  // of the message accepted last
-  std::array<std::uint64_t, StreamOf<Message>::kBytes / 8> words_{};
+  Words words_{};
   Received received_;
   std::uint64_t rejected_ = 0;
   std::uint32_t rejected_in_a_row_ = 0;
@@ -124,94 +142,83 @@ class MessageReader {
   bool backwards_ = false;
 };
 
-/// world.bodies, whose size the scene decides.
-class BodiesWriter {
+template <typename Message>
+class MessageReader {
  public:
-  BodiesWriter() = default;
-  explicit BodiesWriter(const StreamWriter& writer)
-      : writer_(writer), words_(writer.payload_bytes() / 8) {}
+  MessageReader() = default;
+  /// `period_ns`: of the stream's directory; 0 = aperiodic.
+  explicit MessageReader(const StreamReader& reader, std::uint64_t period_ns = 0) noexcept
+      : reader_(reader, period_ns) {}
 
-  /// False, and nothing is published, if they are more than the stream was made for.
-  bool Publish(std::span<const Body> bodies, std::uint64_t stamp_ns) noexcept {
-    const Encoded encoded = Encode(bodies, std::span<std::uint64_t>(words_));
-    if (encoded.used_bytes == 0) return false;
-    return writer_.Publish(std::span<const std::uint64_t>(words_).first(encoded.used_bytes / 8),
-                           encoded.blocks, stamp_ns);
+  /// Unless kFresh, `message` is untouched. `now_ns`: CLOCK_MONOTONIC just before the call. // RT:
+  ReadStatus ReadLatest(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    return reader_.ReadLatest(now_ns, Into(message));
+  }
+  ReadStatus ReadNext(Message& message, std::uint64_t now_ns = kNoClock) noexcept {
+    return reader_.ReadNext(now_ns, Into(message));
   }
 
+  const StreamReader& ring() const noexcept { return reader_.ring(); }
+  const Received& received() const noexcept { return reader_.received(); }
+  std::uint64_t rejected() const noexcept { return reader_.rejected(); }
+  std::uint32_t rejected_in_a_row() const noexcept { return reader_.rejected_in_a_row(); }
+  DecodeStatus refusal() const noexcept { return reader_.refusal(); }
+  bool hopeless() const noexcept { return reader_.hopeless(); }
+
  private:
-  StreamWriter writer_;
-  std::vector<std::uint64_t> words_;
+  static auto Into(Message& message) noexcept {
+    return [&message](std::span<const std::uint64_t> words, Encoded encoded) noexcept {
+      return Decode(words, encoded, message);
+    };
+  }
+
+  WordsReader<std::array<std::uint64_t, StreamOf<Message>::kBytes / 8>> reader_;
 };
 
 class BodiesReader {
  public:
   BodiesReader() = default;
   explicit BodiesReader(const StreamReader& reader)
-      : reader_(reader), words_(WorldBodiesBytes(kMaxBodies) / 8), bodies_(kMaxBodies) {}
+      : reader_(reader, 0, std::vector<std::uint64_t>(WorldBodiesBytes(kMaxBodies) / 8)),
+        bodies_(kMaxBodies) {}
 
-  /// The bodies of the newest message read; empty before the first.
+  /// The bodies of the newest message read; empty before the first, and if it was not sound.
   std::span<const Body> bodies() const noexcept { return std::span(bodies_).first(count_); }
-  const Received& received() const noexcept { return received_; }
+  const Received& received() const noexcept { return reader_.received(); }
 
   ReadStatus ReadLatest() noexcept {
-    const ReadStatus status = reader_.ReadLatest(words_, received_);
-    if (status != ReadStatus::kFresh) return status;
-    std::uint32_t count = 0;
-    const DecodeStatus decoded =
-        Decode(words_, {received_.used_bytes, received_.blocks}, std::span(bodies_), count);
-    count_ = count;
-    return decoded == DecodeStatus::kOk ? status : ReadStatus::kRejected;
+    return reader_.ReadLatest(
+        kNoClock, [this](std::span<const std::uint64_t> words, Encoded encoded) noexcept {
+          const DecodeStatus status = Decode(words, encoded, std::span(bodies_), count_);
+          if (status != DecodeStatus::kOk) count_ = 0;  // they may be partly overwritten
+          return status;
+        });
   }
 
  private:
-  StreamReader reader_;
-  std::vector<std::uint64_t> words_;
+  WordsReader<std::vector<std::uint64_t>> reader_;
   std::vector<Body> bodies_;
-  Received received_;
   std::uint32_t count_ = 0;
-};
-
-/// world.scene, whose size the scene decides: published when a scene was loaded, not every tick.
-class SceneWriter {
- public:
-  SceneWriter() = default;
-  explicit SceneWriter(const StreamWriter& writer)
-      : writer_(writer), words_(writer.payload_bytes() / 8) {}
-
-  /// False, and nothing is published, if it does not fit the room that the stream was made with.
-  bool Publish(const WorldScene& scene, std::uint64_t stamp_ns) noexcept {
-    const Encoded encoded = Encode(scene, std::span<std::uint64_t>(words_));
-    if (encoded.used_bytes == 0) return false;
-    return writer_.Publish(std::span<const std::uint64_t>(words_).first(encoded.used_bytes / 8),
-                           encoded.blocks, stamp_ns);
-  }
-
- private:
-  StreamWriter writer_;
-  std::vector<std::uint64_t> words_;
 };
 
 class SceneReader {
  public:
   SceneReader() = default;
   explicit SceneReader(const StreamReader& reader)
-      : reader_(reader), words_(reader.payload_bytes() / 8) {}
+      : reader_(reader, 0, std::vector<std::uint64_t>(reader.payload_bytes() / 8)) {}
 
   /// The newest sound scene read; revision 0 before the first.
   const WorldScene& scene() const noexcept { return scene_; }
 
   ReadStatus ReadLatest() {
-    Received received;
-    const ReadStatus status = reader_.ReadLatest(words_, received);
-    if (status != ReadStatus::kFresh) return status;
-    const DecodeStatus decoded = Decode(words_, {received.used_bytes, received.blocks}, scene_);
-    return decoded == DecodeStatus::kOk ? status : ReadStatus::kRejected;
+    return reader_.ReadLatest(kNoClock,
+                              [this](std::span<const std::uint64_t> words, Encoded encoded) {
+                                return Decode(words, encoded, scene_);
+                              });
   }
 
  private:
-  StreamReader reader_;
-  std::vector<std::uint64_t> words_;
+  WordsReader<std::vector<std::uint64_t>> reader_;
   WorldScene scene_;
 };
 

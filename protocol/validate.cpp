@@ -38,7 +38,7 @@ bool IsPeriod(std::uint64_t period_ns) {
   return period_ns >= 1 && period_ns <= kLongestPeriodNs;
 }
 bool IsReason(ForceReason reason) {
-  return reason <= ForceReason::kStopped;
+  return reason <= ForceReason::kClutched;
 }
 bool IsPeerState(PeerState state) {
   return state <= PeerState::kIncompatible;
@@ -201,6 +201,10 @@ DecodeStatus Validate(HapticHealth& m) noexcept {
   const Reconciliation& r = m.reconciliation;
   if (!AllFinite(r.newest_jump, r.largest_jump)) return DecodeStatus::kNotFinite;
   if (r.newest_jump < 0 || r.largest_jump < 0) return DecodeStatus::kRange;
+  const Energy& e = m.energy;
+  if (!AllFinite(e.injected, e.dissipated)) return DecodeStatus::kNotFinite;
+  if (e.dissipated < 0) return DecodeStatus::kRange;
+  if (e.unstable > 1 || e.controller > 1) return DecodeStatus::kEnumerator;
   return IsPeriod(m.period_ns) ? DecodeStatus::kOk : DecodeStatus::kRange;
 }
 

@@ -11,6 +11,6 @@ inline constexpr std::uint16_t kVersionMajor = 0;
 inline constexpr std::uint16_t kVersionMinor = 3;
 
 /// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
-inline constexpr std::uint64_t kLayoutHash = 0x60453468F9F4924FULL;
+inline constexpr std::uint64_t kLayoutHash = 0x2C03F6A567697CB9ULL;
 
 }  // namespace rikiseki::protocol

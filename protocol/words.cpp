@@ -38,6 +38,15 @@ std::string Sentence(ForceReason reason) {
              "re-armed.";
     case ForceReason::kStopped:
       return "The haptic server is stopping and has let go of the device.";
+    case ForceReason::kEmergencyStop:
+      return "The emergency stop was pressed or the device's enable input is open, so the strings "
+             "are at minimum tension until somebody enables them.";
+    case ForceReason::kPassivity:
+      return "The finger feels the force as it was rendered, and the passivity controller brakes "
+             "what the rendering gave away.";
+    case ForceReason::kClutched:
+      return "The clutch is engaged: the finger's point in the world stands still and feels no "
+             "force.";
   }
   return "The reason is unknown to this program.";
 }
@@ -74,6 +83,12 @@ std::string Key(ForceReason reason) {
       return "loop_fault";
     case ForceReason::kStopped:
       return "stopped";
+    case ForceReason::kEmergencyStop:
+      return "emergency_stop";
+    case ForceReason::kPassivity:
+      return "passivity";
+    case ForceReason::kClutched:
+      return "clutched";
   }
   return "unknown";
 }

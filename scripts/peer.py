@@ -34,8 +34,8 @@ import sys
 import threading
 import time
 
-VERSION = (0, 2)
-LAYOUT_HASH = 0xE6EFB47136B26316  # 8.3
+VERSION = (0, 3)
+LAYOUT_HASH = 0x2C03F6A567697CB9  # 8.3
 MAGIC = int.from_bytes(b"RIKISEKI", "little")
 BYTE_ORDER = 0x01020304
 HEADER_BYTES = 4096
@@ -148,6 +148,7 @@ WORLD_HEALTH = Record(
     "discarded.unknown_body:i64[3] penalty_impulse:f64[3] moving_bodies:u64 resets:u64 " + SCHEDULING +
     "scene:char[64] lateness:u64[256] duration:u64[256]")
 RECONCILIATION = Record("haptic.health/reconciliation", "frames:u64 newest_jump:f64 largest_jump:f64")
+ENERGY = Record("haptic.health/energy", "injected:f64 dissipated:f64 flagged:u64 unstable:u32 controller:u32")
 VELOCITY = Record("world.frame/plane_velocity", "velocity:f64[3]")
 FRICTION = Record("world.frame/plane_friction", "static_friction:f64 dynamic_friction:f64")
 RECOVERY = Record("world.frame/plane_recovery", "recovery_s:f64")
@@ -157,7 +158,8 @@ LOCAL_BODY = Record("world.frame/local_body", "body:u32 generation:u32 contact_c
                     "acceleration:f64[3] angular_acceleration:f64[3]")
 CONTACT_PLANE = Record("world.frame/contact_plane", "other_body:u32 other_generation:u32 point:f64[3] "
                        "normal:f64[3] gap:f64 friction:f64 other_velocity:f64[3] other_inverse_mass:f64 "
-                       "impulse:f64[3]")
+                       "impulse:f64[3] radius:f64")
+MOBILITY = Record("world.frame/plane_mobility", "inverse_mass:f64")
 SCENE = Record("world.scene", "revision:u64 needs:u64 left_out:u64 gravity:f64[3] name:char[64] body_count:u32 "
                "collider_count:u32")
 SCENE_BODY = Record("world.scene/body", "body:u32 generation:u32 fixed:u32 collider_count:u32 name:char[64]")
@@ -320,7 +322,7 @@ def check_tick(m):
     numbers = [p["pointer"] for p in m["pointers"]]
     demand(all(n < 4 for n in numbers) and len(set(numbers)) == len(numbers), "pointer numbers")
     for p in m["pointers"]:
-        demand(p["reason"] <= 14, "reason")
+        demand(p["reason"] <= 17, "reason")
         demand(p["radius"] >= 0, "radius")
     for r in m["rotations"]:
         normalise(r["orientation"], 0.99 - 1e-16, 1.01 + 1e-16, "no unit quaternion")
@@ -344,6 +346,8 @@ def check_frame(m):
         demand(f["static_friction"] >= 0 and f["dynamic_friction"] >= 0, "a negative friction")
     for r in m["recoveries"]:
         demand(0 <= r["recovery_s"] <= 10, "recovery_s")
+    for p in m["mobilities"]:
+        demand(p["inverse_mass"] >= 0 or p == NOT_SAID, "inverse_mass")
     if m["local"]:
         check_local(m["local"])
 
@@ -357,7 +361,8 @@ def check_local(local):
         check_inertia(body["inertia"])
         normalise(body["orientation"], 0.99 - 1e-16, 1.01 + 1e-16, "no unit quaternion")
         for contact in body["contacts"]:
-            demand(contact["friction"] >= 0 and contact["other_inverse_mass"] >= 0, "a negative contact")
+            demand(min(contact["friction"], contact["other_inverse_mass"], contact["radius"]) >= 0,
+                   "a negative contact")
             normalise(contact["normal"], 1e-12, math.inf, "a normal without direction")
 
 
@@ -371,10 +376,13 @@ def check_inertia(inertia):
 
 
 def check_haptic_health(m):
-    demand(m["reason"] <= 14 and m["peer_state"] <= 5, "enumerator")
+    demand(m["reason"] <= 17 and m["peer_state"] <= 5, "enumerator")
     demand(is_period(m["period_ns"]), "no period")
     for r in m["reconciliation"]:
         demand(r["newest_jump"] >= 0 and r["largest_jump"] >= 0, "a negative jump")
+    for e in m["energy"]:
+        demand(e["dissipated"] >= 0, "negative friction")
+        demand(e["unstable"] <= 1 and e["controller"] <= 1, "enumerator")
 
 
 def check_world_health(m):
@@ -416,7 +424,9 @@ OWN_SURFACE = {"stiffness": 0.0, "damping": 0.0}
 
 NOT_MOVING, SMOOTH, OWN_RECOVERY = {"velocity": [0.0] * 3}, {"static_friction": 0.0, "dynamic_friction": 0.0}, \
     {"recovery_s": 0.0}
+NOT_SAID = {"inverse_mass": -1.0}
 NO_JUMPS = {"frames": 0, "newest_jump": 0.0, "largest_jump": 0.0}
+NO_ENERGY = {"injected": 0.0, "dissipated": 0.0, "flagged": 0, "unstable": 0, "controller": 0}
 NO_FILE = {"sha256": [0] * 32, "path": bytes(224)}
 
 HAPTIC_TICK = Message(1, TICK, [("pointers", "pointer_count", POINTER, 4),
@@ -428,9 +438,11 @@ WORLD_FRAME = Message(16, FRAME, [("planes", "plane_count", PLANE, 32)],
                        Block(2, "velocities", "plane_count", VELOCITY, NOT_MOVING, 32),
                        Block(4, "frictions", "plane_count", FRICTION, SMOOTH, 32),
                        Block(8, "recoveries", "plane_count", RECOVERY, OWN_RECOVERY, 32),
-                       LocalBlock()], check_frame, version=2)
-HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, (), [Block(1, "reconciliation", None, RECONCILIATION, NO_JUMPS)],
-                                check_haptic_health, version=2)
+                       LocalBlock(),
+                       Block(32, "mobilities", "plane_count", MOBILITY, NOT_SAID, 32)], check_frame, version=3)
+HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, (), [Block(1, "reconciliation", None, RECONCILIATION, NO_JUMPS),
+                                                       Block(2, "energy", None, ENERGY, NO_ENERGY)],
+                                check_haptic_health, version=3)
 WORLD_HEALTH_MESSAGE = Message(17, WORLD_HEALTH, check=check_world_health)
 WORLD_BODIES = Message(18, BODIES, [("bodies", "body_count", BODY, 10000)], check=check_bodies)
 WORLD_SCENE = Message(19, SCENE, [("bodies", "body_count", SCENE_BODY, 10000),
@@ -1137,6 +1149,7 @@ class World:
             self.resets += 1
 
     def planes(self, pointers, dt):
+        """The planes and, of each, the mobility of the box: what it yields along its rail."""
         planes = []
         for pointer in pointers:
             distance, point, normal, feature = nearest_plane(self.position, pointer["position"])
@@ -1144,7 +1157,7 @@ class World:
             if distance < pointer["radius"] + 0.02 + 2 * dt * min(speed, 3.0):
                 planes.append({"pointer": pointer["pointer"], "body": 0, "generation": self.generation,
                                "feature": feature, "point": point, "normal": normal})
-        return planes
+        return planes, [{"inverse_mass": 1 / self.mass if self.mass > 0 else 0.0} for _ in planes]
 
     def scene(self):
         """6.5; needs: moving bodies, drag."""
@@ -1222,10 +1235,11 @@ def run_world(arguments):
             peer_state = (WAITING if fresh_ticks < 3 else LOST if lost else LATE if late else LIVE)
         # A finger that has not been heard of for a while gets no planes.
         seen = tick["pointers"] if tick and peer_state in (WAITING, LIVE, LATE) else []
+        planes, mobilities = world.planes(seen, dt)
         frames.publish(WORLD_FRAME.new(
             frame=frame, world_time_ns=frame * period_ns, period_ns=period_ns, acked_epoch=ledger.epoch,
             acked_tick=ledger.tick or 0, baseline_tick=ledger.baseline_tick or 0, applied=ledger.applied,
-            discarded=ledger.discarded, coupling=2, planes=world.planes(seen, dt)))
+            discarded=ledger.discarded, coupling=2, planes=planes, mobilities=mobilities))
         bodies.publish(WORLD_BODIES.new(bodies=[world.body()]))
         own.heartbeat(frame)
         counts = totals if reader is None else \
@@ -1402,7 +1416,8 @@ class Ledger:
         return self.accounts[-1]
 
     def book(self, displayed, shares, finger, previous_duration):
-        """`displayed` on the user; `shares`: (account, force on the user, point) as wanted."""
+        """`displayed` on the user; `shares`: (account, force on the user, point) as wanted; without an account
+        it is the ground's (7.2-10)."""
         correction = previous_duration - self.period if self.ticks else 0.0
         wanted = [sum(share[1][i] for share in shares) for i in range(3)]
         square = dot(wanted, wanted)
@@ -1486,14 +1501,17 @@ class Surfaces:
 
     def __init__(self):
         self.planes = {}  # key -> (from, to, normal, stiffness, damping)
+        self.fixed = set()  # bodies that cannot move, as the frame says
         self.since_ns, self.period_ns = 0, 1
 
     def receive(self, frame, now):
         shown = {key: self._point(plane, now) for key, plane in self.planes.items()}
-        self.planes = {}
-        for plane, surface in zip(frame["planes"], frame["surfaces"]):
+        self.planes, self.fixed = {}, set()
+        for plane, surface, mobility in zip(frame["planes"], frame["surfaces"], frame["mobilities"]):
             if plane["pointer"] != 0:
                 continue
+            if mobility["inverse_mass"] == 0:
+                self.fixed.add((plane["body"], plane["generation"]))
             key = plane["body"], plane["generation"], plane["feature"]
             own = surface["stiffness"] > 0
             self.planes[key] = (shown.get(key, plane["point"]), plane["point"], plane["normal"],
@@ -1617,6 +1635,9 @@ class HapticSide:
         shares, no_channel = [], False
         if state in (LIVE, LATE, LOST):
             for body, (force, point) in self.surfaces.forces(self.finger, now).items():
+                if body in self.surfaces.fixed:  # 7.2-10
+                    shares.append((None, force, point))
+                    continue
                 account = self.ledger.open(body, self.tick)
                 no_channel |= account is None
                 if account is not None:

@@ -29,6 +29,8 @@ void Bind(ConfigSchema& schema, Settings& settings) {
                 "longest silence whose impulse is applied; 0 means max(100 ms, 3 periods)");
   schema.Number("features.radius_mm", &settings.features.radius_mm, 0, 10000,
                 "bodies nearer to the finger than this, plus the way of two periods, send planes");
+  schema.Number("features.finger_friction", &settings.features.finger_friction, 0, 10,
+                "dynamic friction of the finger, combined with a surface's mu as sqrt(mu1 mu2)");
 }
 
 }  // namespace

@@ -37,6 +37,7 @@ struct CouplingSettings {
 
 struct FeatureSettings {
   double radius_mm = 20;  // r_0: planes of bodies within r_0 + 2 Tw v_rel of the finger are sent
+  double finger_friction = 0;  // Coulomb, of the finger; combined as sqrt(mu_finger mu_surface)
 };
 
 struct Settings {

@@ -125,7 +125,7 @@ void WorldStep::BeginHapticEpoch(std::uint64_t epoch) {
 
 void WorldStep::Consume(const protocol::HapticTick& tick) {
   if (!state_->ledger.Consume(tick)) return;
-  state_->fingers = FingersOf(tick);
+  state_->fingers = FingersOf(tick, state_->settings.features.finger_friction);
   state_->stiffness_n_per_m = tick.stiffness;
   state_->silence_ns = 0;
 }

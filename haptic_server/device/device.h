@@ -20,7 +20,8 @@ struct DeviceSample {
   Vec3 position = Vec3::Zero();  // m, centre of the finger
   Vec3 velocity = Vec3::Zero();  // m/s, as estimated by the device's own filter
   Vec3 target =
-      Vec3::Zero();  // m, where a simulated hand wants to be; the position on real devices
+      Vec3::Zero();     // m, where a simulated hand wants to be; the position on real devices
+  bool enabled = true;  // the enable input (foot switch, stop button) is closed, or there is none
 };
 
 class Device {
@@ -34,7 +35,8 @@ class Device {
   /// really displayed after the device's own limits. // RT:
   virtual Vec3 Write(const Vec3& force) noexcept = 0;
 
-  /// Lets go: zero force, minimum tension. Called on every way out. // RT:
+  /// Lets go: zero force, minimum tension. Called on every way out, and in every tick of an emergency
+  /// stop. // RT:
   virtual void Release() noexcept = 0;
 
   virtual std::string Name() const = 0;

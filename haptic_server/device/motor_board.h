@@ -25,6 +25,10 @@ class MotorBoard {
   /// Pulls with `tension` [N] from now on. False if the board does not answer. // RT:
   virtual bool WriteTensions(const FourStrings& tension) noexcept = 0;
 
+  /// Whether the enable input was closed at the last ReadCounts; true on a board that has none. //
+  /// RT:
+  virtual bool Enabled() const noexcept = 0;
+
   /// The simulated hand that holds the grip; null where it is a real one.
   virtual const Hand* hand() const noexcept = 0;
 

@@ -21,8 +21,15 @@ class SimulatedBoard final : public MotorBoard {
 
   bool ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept override;
   bool WriteTensions(const FourStrings& tension) noexcept override;
+  bool Enabled() const noexcept override { return enabled_; }
   const Hand* hand() const noexcept override { return &hand_; }
   std::string Name() const override { return "simulated SPIDAR"; }
+
+  /// Opens and closes the enable input.
+  void SetEnabled(bool enabled) noexcept { enabled_ = enabled; }
+
+  /// What the strings pull with [N].
+  const FourStrings& tension() const noexcept { return tension_; }
 
  private:
   SpidarKinematics kinematics_;
@@ -31,6 +38,7 @@ class SimulatedBoard final : public MotorBoard {
   TensionBounds bounds_;
   Hand hand_;
   FourStrings tension_{};
+  bool enabled_ = true;
   bool started_ = false;
   std::int64_t now_ns_ = 0;
 };

@@ -28,6 +28,7 @@ DeviceStatus Spidar::Read(std::int64_t now_ns, DeviceSample& sample) noexcept {
     moving_ = false;
     return DeviceStatus::kFault;
   }
+  sample.enabled = board_->Enabled();
   PerString lengths{};
   for (std::size_t string = 0; string < kTensionStrings; ++string) {
     lengths[string] =

@@ -10,6 +10,9 @@ namespace {
 constexpr double kZeroNormal = 1e-12;
 constexpr double kUnitRounding = 1e-12;
 constexpr double kLargestStiffness = 1e8;  // N/m; damping alike
+constexpr double kLargestFriction = 1e3;
+constexpr double kLongestRecovery = 10;  // s
+constexpr double kFaded = 1e-9;          // of a force: rounding of the steps to zero
 constexpr std::int64_t kLongestFrameNs = 10'000'000'000;
 
 // Denormal numbers mean nothing in metres and cost a slow path in the processor.
@@ -26,13 +29,20 @@ bool IsSound(const protocol::Plane& plane) {
   const Vec3 normal = ToVec3(plane.normal);
   return IsPlace(ToVec3(plane.point)) && IsPlace(normal) && normal.norm() >= kZeroNormal &&
          plane.stiffness >= 0 && plane.stiffness <= kLargestStiffness && plane.damping >= 0 &&
-         plane.damping <= kLargestStiffness;
+         plane.damping <= kLargestStiffness && IsPlace(ToVec3(plane.velocity)) &&
+         plane.static_friction >= 0 && plane.static_friction <= kLargestFriction &&
+         plane.dynamic_friction >= 0 && plane.dynamic_friction <= kLargestFriction &&
+         plane.recovery_s >= 0 && plane.recovery_s <= kLongestRecovery;
 }
 
 // Unit normals pass bit for bit.
 Vec3 Unit(const Vec3& normal) {
   const double length = normal.norm();
   return std::abs(length - 1) <= kUnitRounding ? normal : Vec3(normal / length);
+}
+
+double RecoveryTime(const protocol::Plane& plane) {
+  return plane.recovery_s > 0 ? plane.recovery_s : kRecoveryTime;
 }
 
 bool SameFeature(const protocol::Plane& a, const protocol::Plane& b) {
@@ -62,11 +72,19 @@ FeatureTrack::FeatureTrack(DisplayRule rule, std::int64_t period_ns)
 void FeatureTrack::Advance(std::int64_t ticks) noexcept {
   // n is below 1e10/1e3; beyond n more ticks change nothing, so j need not run on.
   tick_ = std::min<std::int64_t>(tick_ + std::max<std::int64_t>(ticks, 0), 1'000'000'000);
-  const double recovered =
-      static_cast<double>(ticks) * static_cast<double>(period_ns_) * 1e-9 / kRecoveryTime;
+  const double elapsed_s = static_cast<double>(ticks) * static_cast<double>(period_ns_) * 1e-9;
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < count_; ++i) {
-    features_[i].recovery_left = std::max(0.0, features_[i].recovery_left - recovered);
+    Feature& feature = features_[i];
+    const double step = elapsed_s / RecoveryTime(feature.identity);
+    feature.recovery_left = std::max(0.0, feature.recovery_left - step);
+    feature.strength = feature.leaving ? std::max(0.0, feature.strength - step)
+                                       : std::min(1.0, feature.strength + step);
+    if (feature.strength < kFaded) continue;
+    if (kept != i) features_[kept] = feature;
+    ++kept;
   }
+  count_ = kept;
 }
 
 HalfSpace FeatureTrack::Interpolated(const Feature& feature) const noexcept {
@@ -97,6 +115,12 @@ HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
   return feature.rides ? InWorld(feature.pose_WB, shown) : shown;
 }
 
+bool FeatureTrack::IsPressed(const Feature& feature, const FingerState& finger) const noexcept {
+  const HalfSpace plane = Displayed(feature);
+  return plane.normal.dot(plane.point - finger.position) + finger.radius >
+         feature.recovery * feature.recovery_left;
+}
+
 void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const FingerState> fingers,
                            const LocalBodies& copies) noexcept {
   FollowCopies(copies);
@@ -108,6 +132,7 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
     if (plane.pointer >= fingers.size() || !IsSound(plane)) continue;
     Feature& feature = incoming_[count++];
     feature.identity = plane;
+    feature.leaving = false;
     feature.last_point = WithoutDenormals(ToVec3(plane.point));
     feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));
     const protocol::LocalBody* local = FindLocal(frame, plane);
@@ -137,6 +162,7 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
       feature.previous_normal = now.normal;
       feature.recovery = known.recovery;
       feature.recovery_left = known.recovery_left;
+      feature.strength = known.strength;
     } else {
       feature.previous_point = feature.last_point;
       feature.previous_normal = feature.last_normal;
@@ -146,7 +172,28 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
       const double depth = shown.normal.dot(shown.point - finger.position) + finger.radius;
       feature.recovery = depth > finger.allowed_depth ? depth - finger.allowed_depth : 0;
       feature.recovery_left = 1;
+      feature.strength = 1;
     }
+  }
+  const auto arrivals = std::span(incoming_).first(count);
+  for (std::size_t before = 0; before < count_ && count < incoming_.size(); ++before) {
+    const Feature& known = features_[before];
+    // Where a body's number got another meaning, the new body is there instead of the old.
+    const bool replaced =
+        std::any_of(arrivals.begin(), arrivals.end(), [&](const Feature& arrival) {
+          return arrival.identity.body == known.identity.body &&
+                 arrival.identity.generation != known.identity.generation;
+        });
+    if (paired[before] || replaced || known.identity.pointer >= fingers.size() ||
+        !IsPressed(known, fingers[known.identity.pointer])) {
+      continue;
+    }
+    const HalfSpace now = Interpolated(known);  // where it rides, it rides on
+    Feature& feature = incoming_[count++];
+    feature = known;
+    feature.previous_point = feature.last_point = now.point;
+    feature.previous_normal = feature.last_normal = now.normal;
+    feature.leaving = true;
   }
   std::copy_n(incoming_.begin(), count, features_.begin());
   count_ = count;
@@ -179,12 +226,22 @@ std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexc
     surface.pointer = feature.identity.pointer;
     surface.body = feature.identity.body;
     surface.generation = feature.identity.generation;
+    surface.feature = feature.identity.feature;
+    surface.velocity = ToVec3(feature.identity.velocity);
+    const bool is_rough =
+        feature.identity.static_friction > 0 || feature.identity.dynamic_friction > 0;
+    const BodyState* copy =
+        feature.rides && is_rough ? copies.Find(surface.body, surface.generation) : nullptr;
     surface.stiffness = feature.identity.stiffness;
     surface.damping = feature.identity.damping;
+    surface.static_friction = feature.identity.static_friction;
+    surface.dynamic_friction = feature.identity.dynamic_friction;
+    surface.strength = feature.strength;
     surface.fixed = feature.identity.inverse_mass == 0;
     surface.plane = Displayed(feature);
     const double below = feature.recovery * feature.recovery_left;
     if (below > 0) surface.plane.point -= below * surface.plane.normal;
+    if (copy != nullptr) surface.velocity = copy->VelocityAt(surface.plane.point);
   }
   return std::span(surfaces_).first(count_);
 }
@@ -193,7 +250,7 @@ bool FeatureTrack::Has(std::uint32_t body, std::uint32_t generation,
                        std::uint32_t pointer) const noexcept {
   return std::any_of(features_.begin(), features_.begin() + static_cast<std::ptrdiff_t>(count_),
                      [=](const Feature& feature) {
-                       return feature.identity.body == body &&
+                       return !feature.leaving && feature.identity.body == body &&
                               feature.identity.generation == generation &&
                               feature.identity.pointer == pointer;
                      });

@@ -18,7 +18,10 @@
 namespace rikiseki::haptic {
 
 /// A feature that appears with the finger already inside it starts below the finger and rises to
-/// its place within this time [s], so that the force does not step (Mark 1996: recovery time).
+/// its place within this time [s], so that the force does not step (Mark 1996: recovery time). One
+/// that vanishes while it is pressed stays where it is, and its force fades within the same time,
+/// unless its body was replaced by another generation.
+/// A plane may bring a time of its own.
 inline constexpr double kRecoveryTime = 0.1;
 
 /// Coordinates beyond this [m] are taken for damage, not for places.
@@ -61,11 +64,14 @@ class FeatureTrack {
     Vec3 previous_normal, last_normal;
     double recovery = 0;       // m, how far below its place it started
     double recovery_left = 0;  // 1..0
+    bool leaving = false;      // no longer in the frame
+    double strength = 1;
   };
 
   void FollowCopies(const LocalBodies& copies) noexcept;
   HalfSpace Interpolated(const Feature& feature) const noexcept;
   HalfSpace Displayed(const Feature& feature) const noexcept;
+  bool IsPressed(const Feature& feature, const FingerState& finger) const noexcept;
 
   DisplayRule rule_;
   std::int64_t period_ns_;

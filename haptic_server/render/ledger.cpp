@@ -173,7 +173,7 @@ void Ledger::Book(const Entry& entry) noexcept {
   const double correction_s = ticks_ == 0 ? 0 : Seconds(entry.previous_duration_ns) - period_s_;
   Vec3 wanted = Vec3::Zero();
   for (const BodyShare& share : entry.wanted) wanted += share.force;
-  const double fraction = DisplayedFraction(entry.displayed, wanted);
+  const double fraction = DisplayedFraction(entry.displayed - entry.for_ground, wanted);
 
   Vec3 to_bodies = Vec3::Zero();
   protocol::ImpulseUnits booked{};

@@ -60,13 +60,14 @@ class Ledger {
     std::int64_t previous_duration_ns = 0;  // true t_k - t_(k-1)
     std::uint32_t pointer = 0;
     Vec3 displayed = Vec3::Zero();      // N, on the user
+    Vec3 for_ground = Vec3::Zero();     // N, of it: what no body asked for
     std::span<const BodyShare> wanted;  // each with an open channel, unless its body is fixed
     Vec3 finger = Vec3::Zero();         // m, centre: where what belongs to nobody acts
   };
 
-  /// Books the next tick, from 0: body shares scaled by clip(displayed . wanted / |wanted|^2, 0,
-  /// 1), those of fixed bodies and the rest to the ground. Every unit of the displayed force goes
-  /// somewhere. // RT:
+  /// Books the next tick, from 0: body shares scaled by clip((displayed - for_ground) . wanted /
+  /// |wanted|^2, 0, 1), those of fixed bodies and the rest to the ground. Every unit of the
+  /// displayed force goes somewhere. // RT:
   void Book(const Entry& entry) noexcept;
 
   /// What that added to each open channel, as it is published; at most kMaxTickImpulses. // RT:

@@ -14,10 +14,15 @@ struct Surface {
   std::uint32_t pointer = 0;
   std::uint32_t body = 0;
   std::uint32_t generation = 0;
-  double stiffness = 0;  // N/m; 0 = it brings none of its own
-  double damping = 0;    // N s/m, used only where stiffness > 0
-  bool fixed = false;    // the world says that the body cannot move
-  HalfSpace plane;       // unit normal
+  std::uint32_t feature = 0;
+  Vec3 velocity = Vec3::Zero();  // m/s, of the body's material at the contact; not of the plane
+  double stiffness = 0;          // N/m; 0 = it brings none of its own
+  double damping = 0;            // N s/m, used only where stiffness > 0
+  double static_friction = 0;    // of the finger, Coulomb
+  double dynamic_friction = 0;   // likewise
+  double strength = 1;           // 0..1, of its stiffness and damping: a vanished one fades
+  bool fixed = false;            // the world says that the body cannot move
+  HalfSpace plane;               // unit normal
 };
 
 /// What one body does to the finger in this tick.

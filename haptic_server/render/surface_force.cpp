@@ -8,7 +8,23 @@ SurfaceForce::SurfaceForce(const RenderSettings& settings, double period_s)
     : stiffness_(settings.stiffness_n_per_m),
       damping_(settings.damping_ns_per_m),
       adhesion_(settings.adhesion),
-      period_s_(period_s) {}
+      period_s_(period_s),
+      friction_(settings.friction_stiffness_n_per_m) {}
+
+// On the user, [N]; `force` is the share without it, `way` that of the finger since the tick before.
+Vec3 SurfaceForce::FrictionOf(const BodyContact& body, const Vec3& force, const Vec3& way,
+                              double elapsed_s) noexcept {
+  const Vec3 normal = body.displacement.stableNormalized();
+  return friction_.Force({.body = body.body,
+                          .generation = body.generation,
+                          .normal = normal,
+                          .normal_force = std::max(0.0, force.dot(normal)),
+                          .static_friction = body.static_friction / body.weight,
+                          .dynamic_friction = body.dynamic_friction / body.weight,
+                          .damping = body.damping,
+                          .slip = way - elapsed_s * body.velocity / body.rough_weight},
+                         elapsed_s);
+}
 
 BodyShare SurfaceForce::ShareOf(const BodyContact& body, const Vec3& force) noexcept {
   return {.body = body.body,
@@ -42,21 +58,32 @@ std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
     const bool own = surface.stiffness > 0;
     const Vec3 displacement = multiplier * surface.plane.normal;
     body->displacement += displacement;
-    const double stiffness = own ? surface.stiffness : stiffness_;
+    const double stiffness = surface.strength * (own ? surface.stiffness : stiffness_);
     body->spring += stiffness * displacement;
     body->stiffness += stiffness * multiplier;  // weighted, like damping; divided below
-    body->damping += (own ? surface.damping : damping_) * multiplier;
+    body->damping += surface.strength * (own ? surface.damping : damping_) * multiplier;
     body->weight += multiplier;
+    if (surface.static_friction > 0 || surface.dynamic_friction > 0) {
+      body->static_friction += multiplier * surface.static_friction;
+      body->dynamic_friction += multiplier * surface.dynamic_friction;
+      body->velocity += multiplier * surface.velocity;
+      body->rough_weight += multiplier;
+    }
   }
 
   const double elapsed_s =
       period_s_ * static_cast<double>(std::max<std::int64_t>(elapsed_ticks, 1));
+  const Vec3 finger = contact.proxy - contact.displacement;
+  const Vec3 way = finger - finger_;
+  finger_ = finger;
+  stored_ = 0;
   std::size_t share_count = 0;
   std::array<bool, kMaxContactPlanes> went_on{};
   for (std::size_t i = 0; i < count; ++i) {
     BodyContact& body = now[i];
     body.stiffness /= body.weight;
     body.damping /= body.weight;
+    stored_ += 0.5 * body.spring.dot(body.displacement);
     body.point = contact.proxy - radius * body.displacement.stableNormalized();
     Vec3 before = Vec3::Zero();
     for (std::size_t j = 0; j < count_; ++j) {
@@ -65,10 +92,17 @@ std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
         went_on[j] = true;
       }
     }
-    const Vec3 force = body.spring + body.damping * (body.displacement - before) / elapsed_s;
+    Vec3 force = body.spring + body.damping * (body.displacement - before) / elapsed_s;
     if (!adhesion_ && !(force.dot(body.displacement) > 0)) continue;
+    if (body.static_friction > 0 || body.dynamic_friction > 0) {
+      force += FrictionOf(body, force, way, elapsed_s);
+    }
     shares_[share_count++] = ShareOf(body, force);
     shares_[share_count - 1].displacement = body.displacement;
+  }
+  if (friction_.holds()) {
+    friction_.EndTick();
+    stored_ += friction_.stored();
   }
   if (adhesion_) {  // e = 0 from now on: the damper pulls once more, which makes its impulse add up
                     // to 0

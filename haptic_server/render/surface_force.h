@@ -9,6 +9,7 @@
 
 #include "common/geometry.h"
 #include "haptic_server/render/contact_solve.h"
+#include "haptic_server/render/friction.h"
 #include "haptic_server/render/surface.h"
 #include "haptic_server/settings.h"
 
@@ -19,8 +20,10 @@ inline constexpr std::size_t kMaxShares = 2 * kMaxContactPlanes;
 /// The contact law of one pointer. For body b with e_b = sum of its multiplier_i * normal_i, so
 /// that the e_b add up to e = D - C:  f_b = sum of k_i multiplier_i normal_i + d_b (e_b - e_b of
 /// the tick before)/T. With equal k and d this is the paper's f = k e + d (e - e_before)/T, split
-/// without remainder. Without `adhesion` a body only pushes: f_b is dropped where f_b . e_b <= 0,
-/// and when the finger is free.
+/// without remainder. A surface that fades is as much weaker. Without `adhesion` a body only
+/// pushes: f_b is dropped where f_b . e_b <= 0, and when the finger is free. Where surfaces have
+/// friction, the tangential force of friction.h is part of the share; where they have none, it costs
+/// and changes nothing.
 class SurfaceForce {
  public:
   SurfaceForce(const RenderSettings& settings, double period_s);
@@ -32,7 +35,14 @@ class SurfaceForce {
                               double radius, std::int64_t elapsed_ticks) noexcept;
 
   /// The finger is free, whatever came before. // RT:
-  void Reset() noexcept { count_ = 0; }
+  void Reset() noexcept {
+    count_ = 0;
+    stored_ = 0;
+    friction_.Reset();
+  }
+
+  /// What the springs hold [J], as of the last Update. // RT:
+  double stored() const noexcept { return stored_; }
 
  private:
   struct BodyContact {
@@ -45,14 +55,24 @@ class SurfaceForce {
     Vec3 spring = Vec3::Zero();        // N
     Vec3 point = Vec3::Zero();
     double weight = 0;
+    // Of surfaces with friction, weighted like the damping.
+    double static_friction = 0;
+    double dynamic_friction = 0;
+    Vec3 velocity = Vec3::Zero();  // m/s, of the material
+    double rough_weight = 0;
   };
 
+  Vec3 FrictionOf(const BodyContact& body, const Vec3& force, const Vec3& way,
+                  double elapsed_s) noexcept;
   static BodyShare ShareOf(const BodyContact& body, const Vec3& force) noexcept;
 
   double stiffness_;
   double damping_;
   bool adhesion_;
   double period_s_;
+  Friction friction_;
+  Vec3 finger_ = Vec3::Zero();  // m, centre, in the tick before
+  double stored_ = 0;
   std::size_t count_ = 0;
   std::array<BodyContact, kMaxContactPlanes> contacts_;  // of the tick before
   std::array<BodyShare, kMaxShares> shares_;

@@ -45,10 +45,13 @@ ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
   return ForceReason::kContact;
 }
 
-void SafetyStage::MoveGain(const SafetyInput& input, bool fault) noexcept {
+void SafetyStage::MoveGain(const SafetyInput& input, bool no_force) noexcept {
   const double elapsed_s = std::max(Seconds(input.previous_duration_ns), 0.0);
   const bool shows = input.peer == PeerState::kLive || input.peer == PeerState::kLate;
-  if (fault || (!shows && input.peer != PeerState::kLost)) {
+  const bool fades = input.peer == PeerState::kLost;
+  const double faded = elapsed_s / (settings_.fade_ms * 1e-3);
+  presence_ = shows ? 1 : fades ? std::max(0.0, presence_ - faded) : 0;
+  if (no_force || (!shows && !fades)) {
     gain_ = 0;
   } else if (shows) {
     // A stall must not skip the soft start: it counts as one period.
@@ -60,13 +63,27 @@ void SafetyStage::MoveGain(const SafetyInput& input, bool fault) noexcept {
   }
 }
 
+Vec3 SafetyStage::LightDamping(const SafetyInput& input, ForceReason fault) const noexcept {
+  const bool too_fast = fault == ForceReason::kOverSpeed;
+  const bool fades = fault == ForceReason::kContact && input.peer == PeerState::kLost;
+  if (!(too_fast || fades) || input.stopped || !input.velocity.allFinite()) return Vec3::Zero();
+  Vec3 velocity = input.velocity;  // a wild measurement must not become a blow
+  Shorten(velocity, settings_.speed_limit_m_per_s);
+  return -presence_ * settings_.light_damping_ns_per_m * velocity;
+}
+
 Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   const ForceReason fault = Fault(input);
   const bool faulted = fault != ForceReason::kContact;
-  MoveGain(input, faulted);
+  const bool no_force = input.stopped || faulted || input.clutched;
+  MoveGain(input, no_force);
 
-  const bool wants = !faulted && !input.wanted.isZero(0);
-  Vec3 target = faulted || gain_ == 0 ? Vec3(Vec3::Zero()) : Vec3(gain_ * input.wanted);
+  const bool wants = !no_force && !input.wanted.isZero(0);
+  Vec3 target = no_force || gain_ == 0 ? Vec3(Vec3::Zero()) : Vec3(gain_ * input.wanted);
+  ground_ = LightDamping(input, fault);
+  const bool brakes = !no_force && gain_ > 0 && input.brake.allFinite() && !input.brake.isZero(0);
+  if (brakes) ground_ += gain_ * input.brake;
+  if (!ground_.isZero(0)) target += ground_;
   const bool capped = Shorten(target, settings_.force_cap_n);
   Vec3 change = target - displayed_;
   const bool slewed = Shorten(change, largest_step_n_);
@@ -75,14 +92,20 @@ Vec3 SafetyStage::Limit(const SafetyInput& input) noexcept {
   Shorten(command_, settings_.force_cap_n);
   zero_ticks_ = target.isZero(0) ? zero_ticks_ + 1 : 0;
   if (zero_ticks_ > ticks_to_zero_) command_.setZero();
-  if (!command_.allFinite()) command_.setZero();
+  if (!command_.allFinite() || input.stopped) command_.setZero();
 
-  if (faulted) {
+  if (input.stopped) {
+    reason_ = ForceReason::kEmergencyStop;
+  } else if (faulted) {
     reason_ = fault;
   } else if (input.peer == PeerState::kLost) {
     reason_ = ForceReason::kWorldLost;
   } else if (input.peer != PeerState::kLive && input.peer != PeerState::kLate) {
     reason_ = ForceReason::kWorldAbsent;
+  } else if (input.clutched) {
+    reason_ = ForceReason::kClutched;
+  } else if (brakes) {
+    reason_ = ForceReason::kPassivity;
   } else if (slewed) {
     reason_ = ForceReason::kSlewLimited;
   } else if (capped) {

@@ -1,15 +1,14 @@
 // haptic_status: what both daemons are doing, and above all why the force is what it is. An
 // observer: it maps both segments read-only and disturbs nobody.
-#include <boost/program_options.hpp>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
 #include <thread>
 
+#include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
-#include "common/version.h"
 #include "protocol/tools/observer.h"
 
 namespace rikiseki::protocol {
@@ -30,29 +29,17 @@ struct Options {
 
 Options Parse(int argc, char** argv) {
   Options options;
-  po::options_description description(
-      "haptic_status: what both daemons are doing, and why the force is what it is");
-  description.add_options()("instance", po::value(&options.instance)->value_name("NAME"),
-                            "which pair of daemons (default 0)")(
+  CommandLine line{
+      .program = "haptic_status",
+      .visible = po::options_description(
+          "haptic_status: what both daemons are doing, and why the force is what it is")};
+  line.visible.add_options()("instance", po::value(&options.instance)->value_name("NAME"),
+                             "which pair of daemons (default 0)")(
       "once", po::bool_switch(&options.once), "one report, then end")(
       "json", po::bool_switch(&options.json), "one JSON object per report and line")(
       "interval", po::value(&options.interval_s)->value_name("SECONDS"),
-      "between two reports (default 1)")("version", "prints the version")("help", "prints this");
-  po::variables_map values;
-  try {
-    po::store(po::parse_command_line(argc, argv, description), values);
-    po::notify(values);
-  } catch (const po::error& error) {
-    throw StartError(kExitUsage, std::string(error.what()) + "; try --help");
-  }
-  if (values.count("help") != 0) {
-    std::cout << description;
-    std::exit(kExitOk);
-  }
-  if (values.count("version") != 0) {
-    std::cout << "haptic_status " << kVersion << " (" << kBuild << ")\n";
-    std::exit(kExitOk);
-  }
+      "between two reports (default 1)");
+  ParseCommandLine(argc, argv, line);
   if (!(options.interval_s >= 0.01 && options.interval_s <= 3600)) {
     throw StartError(kExitUsage, "--interval must be from 0.01 to 3600 seconds");
   }
@@ -100,6 +87,27 @@ void PrintLoop(const Json& side) {
             << "  work       " << Durations(side["duration_us"]) << "\n";
 }
 
+// Local bodies; a jump beyond a millimetre says that the copies do not know something.
+void PrintCopies(const Json& reconciliation) {
+  if (reconciliation["frames"] == 0) return;
+  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
+            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
+            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
+}
+
+void PrintEnergy(const Json& energy) {
+  const double injected_mj = energy["injected_j"].get<double>() * 1e3;
+  std::cout << "  energy     the rendering has " << (injected_mj > 0 ? "given " : "absorbed ")
+            << Number(std::abs(injected_mj), 3) << " mJ, the device dissipated "
+            << Number(energy["dissipated_j"].get<double>() * 1e3, 3) << " mJ"
+            << (energy["controller_acts"].get<bool>() ? "; the passivity controller brakes" : "")
+            << "\n  contact    "
+            << (energy["unstable"].get<bool>()
+                    ? "UNSTABLE: it gives more energy than the device can dissipate"
+                    : "no sign of instability")
+            << ", flagged " << energy["times_flagged"] << " times since the start\n";
+}
+
 void PrintHaptic(const Json& haptic) {
   if (!haptic["attached"].get<bool>()) {
     std::cout << "HAPTIC  not there: " << haptic["why"].get<std::string>() << "\n";
@@ -126,6 +134,8 @@ void PrintHaptic(const Json& haptic) {
             << "  world      " << haptic["peer"]["state"].get<std::string>() << ", epoch "
             << haptic["peer"]["epoch"] << ", newest frame "
             << Number(haptic["peer"]["feature_age_ms"], 1) << " ms old\n";
+  PrintEnergy(haptic["energy"]);
+  PrintCopies(haptic["reconciliation"]);
   PrintLoop(haptic);
   std::cout << "  faults     " << haptic["page_faults"]["minor"] << " minor, "
             << haptic["page_faults"]["major"] << " major; largest force "

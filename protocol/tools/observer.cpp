@@ -198,6 +198,11 @@ Json Observer::Haptic(std::uint64_t now_ns, Json& books) {
     report["reconciliation"] = {{"frames", health.reconciliation.frames},
                                 {"newest_jump_mm", health.reconciliation.newest_jump * 1e3},
                                 {"largest_jump_mm", health.reconciliation.largest_jump * 1e3}};
+    report["energy"] = {{"injected_j", health.energy.injected},
+                        {"dissipated_j", health.energy.dissipated},
+                        {"unstable", health.energy.unstable != 0},
+                        {"times_flagged", health.energy.flagged},
+                        {"controller_acts", health.energy.controller != 0}};
     report["page_faults"] = {{"minor", health.minor_faults}, {"major", health.major_faults}};
   }
   HapticTick tick;

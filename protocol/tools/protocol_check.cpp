@@ -1,13 +1,12 @@
 // protocol_check: the conformance kit. It takes the place of one side and judges whatever implements the
 // other against SPEC.md, or looks at a live segment.
 #include <algorithm>
-#include <boost/program_options.hpp>
 #include <cstdio>
 #include <iostream>
 
+#include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
-#include "common/version.h"
 #include "protocol/owner.h"
 #include "protocol/tools/check/suite.h"
 #include "protocol/version.h"
@@ -41,13 +40,14 @@ Options Parse(int argc, char** argv) {
   Options options;
   std::string target;
   std::vector<std::string> words;
-  po::options_description shown(
-      "protocol_check --as world | --as haptic | inspect NAME\n"
-      "plays one side and judges whatever implements the other, or looks at the live segments of "
-      "an "
-      "instance");
-  shown.add_options()("as", po::value(&options.as)->value_name("SIDE"),
-                      "play the world, or the haptic side")(
+  CommandLine line{
+      .program = "protocol_check",
+      .visible = po::options_description(
+          "protocol_check --as world | --as haptic | inspect NAME\n"
+          "plays one side and judges whatever implements the other, or looks at the live segments "
+          "of an instance")};
+  line.visible.add_options()("as", po::value(&options.as)->value_name("SIDE"),
+                             "play the world, or the haptic side")(
       "instance", po::value(&options.play.instance)->value_name("NAME"), "which pair (default 0)")(
       "case", po::value(&options.cases)->value_name("ID"),
       "only this case, or those under it; may be given often")(
@@ -57,29 +57,12 @@ Options Parse(int argc, char** argv) {
       "where the box is, m (default: at the origin as haptic, brought to the finger as world)")(
       "wait", po::value(&options.wait_s)->value_name("SECONDS"),
       "for the other side to come (default 10)")("list", po::bool_switch(&options.list),
-                                                 "prints the cases and their sentences")(
-      "version", "prints the version")("help", "prints this");
-  po::options_description all;
-  all.add(shown).add_options()("words", po::value(&words), "");
-  po::positional_options_description positional;
-  positional.add("words", -1);
-  po::variables_map values;
-  try {
-    po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(),
-              values);
-    po::notify(values);
-  } catch (const po::error& error) {
-    throw StartError(kExitUsage, std::string(error.what()) + "; try --help");
-  }
-  if (values.count("help") != 0) {
-    std::cout << shown;
-    std::exit(kExitOk);
-  }
-  if (values.count("version") != 0) {
-    std::cout << "protocol_check " << kVersion << " (" << kBuild << "), protocol " << kVersionMajor
-              << "." << kVersionMinor << "\n";
-    std::exit(kExitOk);
-  }
+                                                 "prints the cases and their sentences");
+  line.hidden.add_options()("words", po::value(&words), "");
+  line.positional.add("words", -1);
+  line.version_also =
+      ", protocol " + std::to_string(kVersionMajor) + "." + std::to_string(kVersionMinor);
+  ParseCommandLine(argc, argv, line);
   if (!words.empty()) {
     if (words.size() != 2 || words[0] != "inspect" || !options.as.empty()) {
       throw StartError(kExitUsage, "'" + words[0] + "' is not known; try --help");

@@ -65,6 +65,7 @@ void SeedSegments(const std::string& folder) {
   frame.plane_count = 1;
   frame.planes[0].normal = {0, 0, 1};
   frame.planes[0].recovery_s = 1;
+  frame.planes[0].inverse_mass = 0;
   WorldScene scene;
   scene.revision = 1;
   SegmentOwner world(options(Role::kWorld, {{StreamType::kWorldFrame, 352, 4, 50'000'000},

@@ -71,7 +71,8 @@ TEST_CASE("a tick of the loop over shared memory allocates nothing and locks not
       {.peer = {.instance = instance, .role = protocol::Role::kWorld, .required = {}, .owners = {}},
        .poll_ms = 5});
   HapticStep step(settings, *device, owner.epoch());
-  HapticLoop loop(settings, step, owner, link);
+  OperatorPanel panel;
+  HapticLoop loop(settings, step, owner, link, panel);
 
   std::int64_t now_ns = MonotonicNow();
   bool touched = false;
@@ -96,6 +97,16 @@ TEST_CASE("a tick of the loop over shared memory allocates nothing and locks not
     }
     world.reset();
   }
+  const auto reason_of_next_tick = [&] {
+    now_ns += kPeriodNs;
+    loop.Tick(now_ns, now_ns, 0);
+    return loop.reason();
+  };
+  panel.Stop();
+  CHECK(reason_of_next_tick() == protocol::ForceReason::kEmergencyStop);
+  CHECK(reason_of_next_tick() == protocol::ForceReason::kEmergencyStop);
+  panel.Enable();
+  CHECK(reason_of_next_tick() != protocol::ForceReason::kEmergencyStop);
   CHECK(touched);
   CHECK(allocated == 0);
   CHECK(locked == 0);

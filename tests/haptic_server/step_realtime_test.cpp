@@ -37,6 +37,8 @@ TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") 
   Settings settings;
   settings.spidar.motors_m = {Vec3(-0.265, 0.265, 0.265), Vec3(0.265, 0.265, -0.265),
                               Vec3(-0.265, -0.265, -0.265), Vec3(0.265, -0.265, 0.265)};
+  settings.safety.passivity_controller = true;
+  settings.mapping.rotation_deg = Vec3(0, 0, 5);
   const auto device = MakeDevice(settings);
   HapticStep step(settings, *device, 1);
   protocol::HapticTick message;
@@ -49,6 +51,8 @@ TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") 
     plane.feature = i;
     plane.point = {0.02 + 0.001 * i, 0, 0};
     plane.normal = {-1, 0.02 * i - 0.3, 0.01 * i};
+    plane.velocity = {0, 0.1, 0};
+    plane.static_friction = plane.dynamic_friction = 0.1 * (i % 3);
   }
   frame.local_body_count = 4;  // in contact with a floor and with each other
   frame.local_substep_ns = 1'000'000;
@@ -79,13 +83,16 @@ TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") 
     world.heartbeat_ns = time.start_ns;
     if (k % 50 == 0) {
       frame.frame = static_cast<std::uint64_t>(k + 1);
+      frame.plane_count = k % 1000 == 0 ? 20 : 32;  // some vanish, perhaps pressed
       frame.acked_epoch = 1;
       frame.acked_tick = static_cast<std::uint64_t>(k > 10 ? k - 10 : 0);
       world.frame = &frame;
     }
     const long allocations_before = Allocations();
     const long locks_before = Locks();
-    step.Tick(time, world, message);
+    const OperatorInput wish{
+        .stop = k % 2500 == 2400, .enable = k % 2500 == 2450, .clutch = k % 1500 > 1450};
+    step.Tick(time, world, message, wish);
     allocated += Allocations() - allocations_before;
     locked += Locks() - locks_before;
     touched = touched || message.pointers[0].reason == protocol::ForceReason::kContact;

@@ -10,6 +10,9 @@
 #include <vector>
 
 #include "haptic_server/device/hand.h"
+#include "haptic_server/device/mapping.h"
+#include "haptic_server/device/simulated_board.h"
+#include "haptic_server/device/spidar.h"
 #include "haptic_server/render/ledger.h"
 #include "tests/haptic_server/test_device.h"
 
@@ -53,7 +56,7 @@ struct Bench {
     TickTime time{.start_ns = now_ns, .previous_duration_ns = previous_ns, .missed = missed};
     if (beats) world.heartbeat_ns = now_ns;
     world.frame = hand_over;
-    step.Tick(time, world, message);
+    step.Tick(time, world, message, wish);
     previous_ns = duration;
     now_ns += duration;
     return ToVec3(message.pointers[0].force);
@@ -70,6 +73,7 @@ struct Bench {
   TestDevice device;
   HapticStep step;
   WorldInput world{.epoch = 9, .ready = true};
+  OperatorInput wish;
   bool beats = true;
   std::int64_t now_ns = 1'000'000'000;
   std::int64_t previous_ns = 0;
@@ -207,7 +211,9 @@ TEST_CASE(
     REQUIRE(bench.message.pointers[0].position[1] == 0);  // the last sound one
   }
   REQUIRE(bench.message.pointers[0].reason == reason);
-  REQUIRE(bench.device.force.isZero(0));
+  // A finger that is too fast is damped: 1 N s/m, at most as for the speed limit of 3 m/s.
+  const Vec3 damping = reason == ForceReason::kOverSpeed ? Vec3(0, -3, 0) : Vec3(0, 0, 0);
+  REQUIRE((bench.device.force - damping).norm() < 1e-9);
   REQUIRE(bench.step.health().reason == reason);
   bench.device.status = DeviceStatus::kOk;
   bench.device.next.velocity.setZero();
@@ -261,6 +267,445 @@ TEST_CASE("a contact without a channel displays no force") {
   REQUIRE(bench.Run(400).norm() > 0.1);
   REQUIRE(bench.message.channel_count == 1);
   REQUIRE(bench.message.world_epoch == 10);
+}
+
+// The finger is at `at` in the world, 3 mm deep in a wall on the plane x = 0 whose normal is -x.
+struct MappedBench : Bench {
+  explicit MappedBench(const Settings& used) : Bench(used), mapping(used.mapping) {
+    Place(Vec3(-0.05, 0, 0));
+  }
+  void Place(const Vec3& at) {
+    const MappingSettings& m = settings.mapping;
+    const Vec3 turned = (at - m.origin_mm * 1e-3) / m.motion_scale;
+    // The inverse of a rotation, by what the mapping says of the axes.
+    for (int i = 0; i < 3; ++i) {
+      device.next.position[i] = mapping.VelocityInWorld(Vec3::Unit(i)).dot(turned) / m.motion_scale;
+    }
+  }
+  Mapping mapping;
+};
+
+Settings Mapped(double motion_scale, double force_scale) {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  settings.render.damping_ns_per_m = 0;
+  settings.mapping = {.origin_mm = Vec3(20, -7, 3),
+                      .rotation_deg = Vec3(30, 40, -70),
+                      .motion_scale = motion_scale,
+                      .force_scale = force_scale};
+  return settings;
+}
+
+TEST_CASE("through the mapping the hand feels s_f s_x k, and the world keeps its own units") {
+  const double motion = GENERATE(1.0, 5.0, 0.5);
+  const double force = GENERATE(1.0, 0.2, 2.0);
+  MappedBench bench(Mapped(motion, force));
+  bench.Run(200);
+  std::map<std::uint32_t, ImpulseUnits> totals;
+  Vec3 impulse = Vec3::Zero();
+  for (int k = 1; k <= 60; ++k) {
+    bench.Place(Vec3(-0.01 + 2e-5 * k, 0, 0));
+    bench.Run(1);
+    impulse -= ToVec3(bench.message.pointers[0].force) * 1e-3;
+  }
+  const protocol::Pointer& pointer = bench.message.pointers[0];
+  REQUIRE((ToVec3(pointer.position) - Vec3(-0.0088, 0, 0)).norm() < 1e-12);
+  REQUIRE(pointer.radius == 0.01);
+  const Vec3 in_world(-2000 * 0.0012, 0, 0);
+  REQUIRE((ToVec3(pointer.force) - in_world).norm() < 1e-9);
+  // The device got s_f R^T f: s_f s_x k times its own way.
+  REQUIRE((bench.mapping.ForceInWorld(bench.device.force) - in_world).norm() < 1e-9);
+  REQUIRE(bench.device.force.norm() == Approx(force * 2.4));
+  const double depth_at_device = 0.0012 / motion;
+  REQUIRE(bench.device.force.norm() / depth_at_device == Approx(force * motion * 2000));
+  // Books in world units.
+  REQUIRE(bench.message.channels[0].impulse[0] == Approx(impulse.x() * 1e12).epsilon(1e-9));
+  REQUIRE(bench.message.force_cap == Approx(10 / force));
+  REQUIRE(bench.step.health().slew_limit == Approx(5000 / force));
+
+  // Cap and slew act at the device, whatever the scale.
+  bench.Place(Vec3(0.09, 0, 0));
+  for (int k = 0; k < 100; ++k) {
+    const Vec3 before = bench.device.force;
+    bench.Run(1);
+    REQUIRE((bench.device.force - before).norm() <= 5);
+    REQUIRE(bench.device.force.norm() <= 10);
+    REQUIRE(ToVec3(bench.message.pointers[0].force).norm() <=
+            bench.message.force_cap * (1 + 1e-14));
+  }
+  REQUIRE(bench.device.force.norm() == Approx(10));
+}
+
+TEST_CASE("books and energy balance at s_x = 5, s_f = 0.2") {
+  MappedBench bench(Mapped(5, 0.2));
+  bench.settings.render.damping_ns_per_m = 0;
+  bench.Run(200);
+  // In and out again, quasi-statically: a spring gives back what it took, and what the hand did on
+  // the device is s_f/s_x of what it did on the world.
+  double work_at_device = 0;
+  double work_in_world = 0;
+  double largest = 0;
+  ImpulseUnits booked{};
+  Vec3 impulse = Vec3::Zero();
+  Vec3 hand = bench.device.next.position;
+  Vec3 finger = ToVec3(bench.message.pointers[0].position);
+  const int steps = 4000;
+  for (int k = 0; k <= steps; ++k) {
+    const double q = std::sin(M_PI * k / steps);
+    bench.Place(Vec3(-0.0101 + 0.004 * q, 0.002 * q, 0));
+    const Vec3 force_before = bench.device.force;
+    const Vec3 world_force_before = ToVec3(bench.message.pointers[0].force);
+    bench.Run(1);
+    work_at_device += force_before.dot(bench.device.next.position - hand);
+    work_in_world += world_force_before.dot(ToVec3(bench.message.pointers[0].position) - finger);
+    hand = bench.device.next.position;
+    finger = ToVec3(bench.message.pointers[0].position);
+    impulse -= ToVec3(bench.message.pointers[0].force) * 1e-3;
+    largest = std::max(largest, bench.device.force.norm());
+    booked = bench.message.channels[0].impulse;
+  }
+  REQUIRE(largest == Approx(0.2 * 2000 * 0.0039).epsilon(1e-3));
+  REQUIRE(work_at_device == Approx(work_in_world * 0.2 / 5).epsilon(1e-9));
+  // The zero-order hold leaks k/2 sum (dx)^2 = k/2 pi^2/2 a^2/steps of the way a at the device.
+  const double stored = 0.2 * 5 * 2000 / 2 * 0.0008 * 0.0008;
+  REQUIRE(std::abs(work_at_device) < 0.01 * stored);
+  for (int i = 0; i < 3; ++i) {
+    REQUIRE(static_cast<double>(booked[static_cast<std::size_t>(i)]) * 1e-12 ==
+            Approx(impulse[i]).margin(1e-9));
+  }
+  REQUIRE(bench.message.ground.impulse == ImpulseUnits{});
+}
+
+TEST_CASE(
+    "the clutch: the finger stays, the force fades by the slew limit, and comes back softly") {
+  Settings settings;
+  settings.safety.slew_limit_n_per_s = 1000;
+  settings.safety.fade_ms = 50;
+  settings.safety.force_cap_n = 10;
+  settings.mapping.motion_scale = 2;
+  MappedBench bench(settings);
+  bench.Run(300);
+  for (int k = 0; k < 200; ++k) {
+    bench.Place(Vec3(-0.01 + 0.002 * (k + 1) / 200, 0, 0));
+    bench.Run(1);
+  }
+  bench.Run(300);
+  REQUIRE(bench.message.pointers[0].force[0] == Approx(-4));
+  const protocol::Vector there = bench.message.pointers[0].position;
+
+  bench.wish.clutch = true;
+  Vec3 before = bench.device.force;
+  for (int k = 0; k < 300; ++k) {
+    bench.device.next.position += Vec3(-1e-4, 5e-5, 0);  // the hand goes elsewhere
+    bench.device.next.velocity = Vec3(-0.1, 0.05, 0);
+    bench.Run(1);
+    REQUIRE((bench.device.force - before).norm() <= 1.0);
+    before = bench.device.force;
+    REQUIRE(bench.message.pointers[0].position == there);
+    REQUIRE(bench.message.pointers[0].velocity == protocol::Vector{});
+    REQUIRE(bench.message.pointers[0].reason == ForceReason::kClutched);
+    if (k >= 4) REQUIRE(bench.device.force.isZero(0));
+  }
+
+  bench.wish.clutch = false;
+  bench.device.next.velocity.setZero();
+  for (int k = 0; k < 200; ++k) {
+    bench.Run(1);
+    REQUIRE(bench.message.pointers[0].position == there);
+    // 4 N over 200 ms of soft start: 0.02 N a tick, and in the first the same from the damper.
+    REQUIRE((bench.device.force - before).norm() <= (k == 0 ? 0.0401 : 0.0201));
+    before = bench.device.force;
+  }
+  bench.Run(100);
+  REQUIRE(bench.message.pointers[0].force[0] == Approx(-4));
+  // And the finger follows again.
+  bench.device.next.position.x() -= 0.001;
+  bench.Run(1);
+  REQUIRE(bench.message.pointers[0].position[0] == Approx(there[0] - 0.002));
+}
+
+TEST_CASE("a finger that the mapping throws out of the world feels nothing") {
+  Settings settings;
+  settings.mapping.motion_scale = 1000;
+  Bench bench(settings);
+  bench.Run(10);
+  bench.device.next.position = Vec3(1e11, 0, 0);
+  bench.Run(1);
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kNotFinite);
+  REQUIRE(bench.device.force.isZero(0));
+  REQUIRE(bench.message.pointers[0].position[0] == -50);
+}
+
+// In contact with 4 N.
+void PressOn(Bench& bench) {
+  bench.Run(300);
+  for (int i = 0; i < 60; ++i) {
+    bench.device.next.position.x() += 0.0007;
+    bench.device.next.velocity.x() = 0.7;
+    bench.Run(1);
+  }
+  bench.device.next.velocity.setZero();
+  REQUIRE(bench.Run(40).norm() == Approx(4).epsilon(1e-6));
+}
+
+TEST_CASE("the emergency stop takes the force away in its own tick, and keeps it away") {
+  Settings settings;
+  settings.safety.slew_limit_n_per_s = 1000;  // 1 N a tick: 4 ticks without the stop
+  settings.safety.fade_ms = 50;
+  Bench bench(settings);
+  PressOn(bench);
+  bench.device.released = false;
+  SECTION("by command") {
+    bench.wish.stop = true;
+  }
+  SECTION("by the device's enable input") {
+    bench.device.next.enabled = false;
+  }
+  SECTION("by the enable input of a device that measures nonsense") {
+    bench.device.next.enabled = false;
+    bench.device.next.position.y() = std::nan("");
+  }
+  SECTION("and nobody can enable in the tick of a stop") {
+    bench.wish.stop = bench.wish.enable = true;
+  }
+  REQUIRE(bench.Run(1).isZero(0));
+  REQUIRE(bench.device.released);
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kEmergencyStop);
+  bench.wish = {};
+  bench.device.next.enabled = true;
+  bench.device.next.position.y() = 0;
+  for (int k = 0; k < 500; ++k) {  // latched, whatever the world does
+    REQUIRE(bench.Run(1).isZero(0));
+    REQUIRE(bench.message.pointers[0].reason == ForceReason::kEmergencyStop);
+  }
+  bench.world.ready = false;
+  for (int k = 0; k < 200; ++k) REQUIRE(bench.Tick().isZero(0));
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kEmergencyStop);
+  bench.world.ready = true;
+  bench.ticks_run = 0;
+  bench.Run(400);
+  REQUIRE(bench.device.force.isZero(0));
+
+  bench.wish.enable = true;
+  Vec3 before = Vec3::Zero();
+  for (int k = 0; k < 199; ++k) {
+    bench.Run(1);
+    bench.wish = {};
+    REQUIRE(bench.message.pointers[0].reason == ForceReason::kSoftStart);
+    REQUIRE((bench.device.force - before).norm() <= (k == 0 ? 0.0401 : 0.0201));
+    before = bench.device.force;
+  }
+  REQUIRE(bench.Run(50).norm() == Approx(4).epsilon(1e-6));
+}
+
+TEST_CASE("a device whose enable input is open at the start starts stopped") {
+  Bench bench;
+  bench.device.next.enabled = false;
+  bench.wish.enable = true;  // in vain as long as it is open
+  bench.device.next.position.x() = -0.008;
+  for (int k = 0; k < 400; ++k) REQUIRE(bench.Run(1).isZero(0));
+  bench.wish.enable = false;
+  bench.device.next.enabled = true;
+  for (int k = 0; k < 100; ++k) REQUIRE(bench.Run(1).isZero(0));
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kEmergencyStop);
+  bench.wish.enable = true;
+  bench.Run(400);
+  REQUIRE(bench.device.force.norm() == Approx(4).epsilon(1e-6));
+}
+
+TEST_CASE("an emergency stop leaves every string of a SPIDAR at its minimum tension") {
+  Settings settings;
+  settings.spidar.motors_m = {Vec3(-0.265, 0.265, 0.265), Vec3(0.265, 0.265, -0.265),
+                              Vec3(-0.265, -0.265, -0.265), Vec3(0.265, -0.265, 0.265)};
+  settings.hand.script = HandScript::kRest;
+  settings.hand.home_mm = Vec3(-8, 5, 3);
+  auto owned = std::make_unique<SimulatedBoard>(settings.spidar, MakeHand(settings));
+  SimulatedBoard& board = *owned;
+  Spidar spidar(settings.spidar, std::move(owned));
+  HapticStep step(settings, spidar, kOwnEpoch);
+  protocol::WorldFrame frame;
+  frame.period_ns = 50'000'000;
+  frame.plane_count = 1;
+  frame.planes[0] = WallFacing(Vec3::Zero(), -Vec3::UnitX());
+  protocol::HapticTick message;
+  std::int64_t now_ns = 0;
+  const auto run = [&](int ticks) {
+    for (int k = 0; k < ticks; ++k, now_ns += kPeriodNs) {
+      const bool due = now_ns % 50'000'000 == 0;
+      if (due) ++frame.frame;
+      step.Tick(
+          {.start_ns = now_ns, .previous_duration_ns = now_ns == 0 ? 0 : kPeriodNs},
+          {.epoch = 9, .ready = true, .heartbeat_ns = now_ns, .frame = due ? &frame : nullptr},
+          message);
+    }
+  };
+  const FourStrings loose = {0.5, 0.5, 0.5, 0.5};
+  run(500);
+  REQUIRE(ToVec3(message.pointers[0].force).norm() > 0.5);
+  REQUIRE(board.tension() != loose);
+  board.SetEnabled(false);
+  run(1);
+  REQUIRE(message.pointers[0].reason == ForceReason::kEmergencyStop);
+  REQUIRE(board.tension() == loose);
+  board.SetEnabled(true);
+  run(100);
+  REQUIRE(board.tension() == loose);
+}
+
+TEST_CASE("light damping goes to the ground, and is over when the fade is") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  settings.safety.light_damping_ns_per_m = 2;
+  Bench bench(settings);
+  PressOn(bench);
+  const ImpulseUnits ground_before = bench.message.ground.impulse;
+  REQUIRE(ground_before == ImpulseUnits{});
+  bench.world.ready = false;
+  double damped = 0;  // N s
+  for (int k = 1; k < 80; ++k) {
+    bench.device.next.position.y() += 0.0005;  // along the wall
+    bench.device.next.velocity = Vec3(0, 0.5, 0);
+    bench.Tick();
+    const double left = 1 - k / 80.0;
+    REQUIRE((bench.device.force - left * Vec3(-4, -2 * 0.5, 0)).norm() < 1e-6);
+    damped += left * 2 * 0.5 * 1e-3;
+  }
+  REQUIRE(bench.message.ground.impulse[1] == Approx(damped * 1e12).epsilon(1e-6));
+  REQUIRE(std::abs(bench.message.ground.impulse[0]) < 1'000'000);
+  for (int k = 0; k < 4; ++k) bench.Tick();
+  REQUIRE(bench.device.force.isZero(0));
+  REQUIRE(bench.Tick().isZero(0));  // however long it goes on moving
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kWorldAbsent);
+
+  // Too fast and without a world: nothing either.
+  bench.device.next.velocity = Vec3(0, 50, 0);
+  REQUIRE(bench.Tick().isZero(0));
+}
+
+TEST_CASE("a surface that vanishes under the finger fades out, in the time that it asked for") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  settings.render.damping_ns_per_m = 0;
+  Bench bench(settings);
+  bench.planes[0].recovery_s = 0.2;
+  PressOn(bench);
+  bench.planes.clear();
+  bench.ticks_run = 0;
+  for (int k = 0; k < 200; ++k) {
+    const Vec3 force = bench.Run(1);
+    REQUIRE((force - (1 - k / 200.0) * Vec3(-4, 0, 0)).norm() < 1e-9);
+    REQUIRE(bench.message.channels[0].state == protocol::ChannelState::kOpen);
+  }
+  REQUIRE(bench.Run(1).isZero(0));
+  REQUIRE(bench.message.pointers[0].reason == ForceReason::kNoContact);
+  REQUIRE(bench.message.channels[0].state == protocol::ChannelState::kClosed);
+}
+
+TEST_CASE("friction is part of the body's share: nothing of it goes to the ground") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  Bench bench(settings);
+  bench.planes[0].dynamic_friction = bench.planes[0].static_friction = 0.5;
+  PressOn(bench);
+  const ImpulseUnits before = bench.message.channels[0].impulse;
+  for (int k = 0; k < 200; ++k) {
+    bench.device.next.position.y() += 1e-4;
+    bench.Run(1);
+  }
+  REQUIRE((ToVec3(bench.message.pointers[0].force) - Vec3(-4, -2, 0)).norm() < 1e-6);
+  REQUIRE(bench.message.ground.impulse == ImpulseUnits{});
+  // 2 N along +y on the wall, but for the first 2 mm of stick.
+  const double dragged =
+      1e-12 * static_cast<double>(bench.message.channels[0].impulse[1] - before[1]);
+  REQUIRE(dragged == Approx(2 * 0.18 + 0.02).epsilon(0.02));
+}
+
+// A bare SPIDAR of 0.03 kg, drawn to the wall by 1 N.
+struct BareDevice {
+  explicit BareDevice(Bench& used) : bench(used), step(ExactStep({0.03, 0.2, 0}, 1e-3)) {
+    bench.device.next.position = Vec3(x, 0, 0);
+  }
+  void Run(int ticks) {
+    for (int k = 0; k < ticks; ++k) {
+      bench.Run(1);
+      displayed += bench.device.force.x() * 1e-3;
+      braked = braked || bench.message.pointers[0].reason == ForceReason::kPassivity;
+      const double force = bench.device.force.x() + 1;
+      x += step.yv * v + step.yf * force;
+      v = step.vv * v + step.vf * force;
+      bench.device.next.position.x() = x;
+      bench.device.next.velocity.x() = v;
+    }
+  }
+  Bench& bench;
+  ImpedanceStep step;
+  double x = -0.012, v = 0.1;
+  double displayed = 0;  // N s, on the device
+  bool braked = false;
+};
+
+TEST_CASE("an unstable contact is flagged in health; the controller keeps it stable and says so") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  settings.render.stiffness_n_per_m = 4000;  // ten times what the device bears without damping
+  settings.render.damping_ns_per_m = 0;
+  SECTION("unstable") {
+    Bench bench(settings);
+    bench.Run(300);
+    BareDevice device(bench);
+    device.Run(3000);
+    CHECK(bench.step.health().energy.flagged > 0);
+    CHECK(bench.step.health().energy.injected > 1e-3);
+    CHECK(bench.step.health().energy.dissipated > 0);
+    CHECK_FALSE(device.braked);
+  }
+  SECTION("damped as the rule says") {
+    settings.render.damping_ns_per_m = 4;
+    Bench bench(settings);
+    bench.Run(300);
+    BareDevice device(bench);
+    device.Run(3000);
+    CHECK(bench.step.health().energy.flagged == 0);
+    CHECK(device.x == Approx(-0.01 + 1 / 4000.0).margin(1e-5));
+  }
+  SECTION("braked") {
+    settings.safety.passivity_controller = true;
+    Bench bench(settings);
+    bench.Run(300);
+    BareDevice device(bench);
+    device.Run(3000);
+    CHECK(bench.step.health().energy.flagged == 0);
+    CHECK(device.braked);
+    CHECK(device.x == Approx(-0.01 + 1 / 4000.0).margin(1e-4));
+    CHECK(bench.message.ground.impulse[0] != 0);
+    // Every unit of the displayed force is booked: to the wall or to the ground.
+    const double booked =
+        static_cast<double>(bench.message.ground.impulse[0] + bench.message.channels[0].impulse[0]);
+    CHECK(booked == Approx(-1e12 * device.displayed).epsilon(1e-9));
+  }
+}
+
+TEST_CASE("a body that carries the hand along gives energy by right: nothing is injected") {
+  Settings settings;
+  settings.safety.soft_start_ms = 0;
+  settings.render.damping_ns_per_m = 0;
+  Bench bench(settings);
+  PressOn(bench);
+  const double before = bench.step.health().energy.injected;
+  // Frame by frame the wall moves by 5 mm; shown interpolated, the finger moves with it.
+  const Vec3 finger = bench.device.next.position;
+  bench.ticks_run = 0;
+  double moved = 0;
+  for (int k = 0; k < 1000; ++k) {
+    if (k % 50 == 0) bench.planes[0].point = {-0.005 * (1 + k / 50), 0, 0};
+    bench.device.next.position = finger - Vec3(1e-4 * k, 0, 0);
+    bench.device.next.velocity.x() = -0.1;
+    const Vec3 force = bench.Run(1);
+    REQUIRE(force.x() == Approx(-4).epsilon(1e-6));
+    moved = 1e-4 * k;
+  }
+  REQUIRE(4 * moved > 0.39);  // J that the wall gave
+  REQUIRE(std::abs(bench.step.health().energy.injected - before) < 1e-6);
 }
 
 // The block of the reference scenario P: exact Coulomb slide, pushed by impulses.

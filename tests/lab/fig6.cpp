@@ -117,6 +117,9 @@ world::Scene CubeScene(const BlockPush& push) {
 BlockPushResult SimulateBlockPush(const BlockPush& push) {
   const haptic::Settings haptic_settings = HapticSettings(push);
   const world::Settings world_settings = WorldSettings(push);
+  if (world_settings.period_ns() % haptic_settings.period_ns() != 0) {
+    throw std::invalid_argument("the world period is not a whole number of haptic periods");
+  }
   const bool engine = push.world == PushedWorld::kBullet;
   const world::Scene scene = engine ? CubeScene(push) : SlidingScene(push);
   std::unique_ptr<world::DynamicsWorld> dynamics;

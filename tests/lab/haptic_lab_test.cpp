@@ -119,10 +119,37 @@ TEST_CASE("haptic_lab meets the reference rows") {
   const std::string data = RIKISEKI_SOURCE_DIR "/tests/data/";
   const Ended pokes = Run("fig6 --cases " + data + "fig6_runs_P.csv");
   CHECK(pokes.exit_code == 0);
-  CHECK(Contains(pokes.output, "70 rows: 40 ok 0 missed 0 unstable 30 unsupported"));
+  CHECK(Contains(pokes.output, "70 rows: 70 ok 0 missed 0 unstable 0 unsupported"));
   const Ended pushes = Run("fig6 --cases " + data + "fig6_runs_H.csv");
   CHECK(pushes.exit_code == 0);
-  CHECK(Contains(pushes.output, "35 rows: 20 ok 0 missed 0 unstable 15 unsupported"));
+  CHECK(Contains(pushes.output, "35 rows: 35 ok 0 missed 0 unstable 0 unsupported"));
+}
+
+TEST_CASE("haptic_lab runs planes, walls and both row formats of multirate") {
+  const std::string data = RIKISEKI_SOURCE_DIR "/tests/data/";
+  const Ended planes = Run("planes --cases " + data + "plane_cases.csv");
+  CHECK(planes.exit_code == 0);
+  CHECK(Contains(planes.output, "105 rows: 105 ok"));
+  const Ended growth = Run("multirate --cases " + data + "multirate_rho_samples.csv");
+  CHECK(growth.exit_code == 0);
+  CHECK(Contains(growth.output, "100 rows: 100 ok"));
+  const Ended masses = Run("multirate --shard 9/60 --cases " + data + "multirate_minmass.csv");
+  CHECK(masses.exit_code == 0);
+  CHECK(Contains(masses.output, "4 rows: 4 ok"));
+  CHECK(Contains(masses.output, "got_stable_intervals_kg_in_1e-5..1e4,got_status"));
+  const Ended walls = Run("wall --shard 8/60 --cases " + data + "wall_kmax.csv");
+  CHECK(walls.exit_code == 0);
+  CHECK(Contains(walls.output, "3 rows: 3 ok"));
+  const Ended neither = Run("multirate --cases " + data + "wall_kmax.csv");
+  CHECK(neither.exit_code == 78);
+  CHECK(Contains(neither.output, "wall_kmax.csv: the columns are of no row format of multirate"));
+  for (const char* grid : {"planes", "wall"}) {
+    CAPTURE(grid);
+    const Ended own = Run(std::string(grid) + " --quick --shard 1/4");
+    CHECK(own.exit_code == 0);
+    CHECK(Contains(own.output, " 0 missed"));
+  }
+  CHECK(Contains(Run("multirate --quick --shard 3/12").output, "Mass [kg] from which on"));
 }
 
 TEST_CASE("haptic_lab runs its own grid, whole or in shards") {

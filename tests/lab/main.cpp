@@ -1,23 +1,26 @@
 // haptic_lab: experiments in virtual time with the very step functions that the daemons ship.
 #include <algorithm>
-#include <boost/program_options.hpp>
 #include <charconv>
 #include <fstream>
 #include <iostream>
 #include <thread>
 
+#include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
-#include "common/version.h"
 #include "tests/lab/fig6.h"
+#include "tests/lab/multirate.h"
+#include "tests/lab/planes.h"
+#include "tests/lab/pushes.h"
 #include "tests/lab/study.h"
+#include "tests/lab/wall.h"
 
 namespace rikiseki::lab {
 namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Fig6()};
+  return {Fig6(), Planes(), Pushes(), Wall(), MultirateMasses(), MultirateGrowth()};
 }
 
 struct Options {
@@ -30,7 +33,11 @@ struct Options {
 
 std::string CaseNames() {
   std::string names;
-  for (const Case& known : Cases()) names += (names.empty() ? "" : ", ") + known.name;
+  std::string last;
+  for (const Case& known : Cases()) {
+    if (known.name != last) names += (names.empty() ? "" : ", ") + known.name;
+    last = known.name;
+  }
   return names;
 }
 
@@ -41,7 +48,7 @@ void PrintHelp(const po::options_description& description) {
     std::cout << "  " << known.name << "  " << known.purpose << "\n";
   std::cout << "\n"
             << description
-            << "\nExit status: 0; 1 if an expected result was missed; 64 for a wrong "
+            << "\nExit status: 0; 1 if an expected result or a bar was missed; 64 for a wrong "
             << "command line; 78 for a\nwrong table.\n";
 }
 
@@ -61,36 +68,19 @@ Options Parse(int argc, char** argv) {
   Options options;
   options.study.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::string shard = "1/1";
-  po::options_description visible("Options");
-  visible.add_options()("cases", po::value(&options.cases)->value_name("F.csv"),
-                        "rows to run; without it, the case's own grid")(
+  CommandLine line{.program = "haptic_lab", .visible = po::options_description("Options")};
+  line.visible.add_options()("cases", po::value(&options.cases)->value_name("F.csv"),
+                             "rows to run; without it, the case's own grid")(
       "out", po::value(&options.out)->value_name("F.csv"),
       "where the rows go, with got_... columns appended; without it, rows of --cases go to stdout")(
       "quick", po::bool_switch(&options.quick), "makes the case's own grid smaller")(
       "jobs", po::value(&options.study.jobs)->value_name("N"), "threads (default: one per core)")(
       "shard", po::value(&shard)->value_name("K/N"), "only every N-th row, from the K-th on")(
-      "seed", po::value(&options.study.seed)->value_name("S"), "of what a case draws at random")(
-      "version", "prints the version")("help", "prints this");
-  po::options_description all;
-  all.add(visible).add_options()("case", po::value(&options.case_name));
-  po::positional_options_description positional;
-  positional.add("case", 1);
-  po::variables_map values;
-  try {
-    po::store(po::command_line_parser(argc, argv).options(all).positional(positional).run(),
-              values);
-    po::notify(values);
-  } catch (const po::error& error) {
-    throw StartError(kExitUsage, std::string(error.what()) + "; try --help");
-  }
-  if (values.count("help") != 0) {
-    PrintHelp(visible);
-    std::exit(kExitOk);
-  }
-  if (values.count("version") != 0) {
-    std::cout << "haptic_lab " << kVersion << " (" << kBuild << ")\n";
-    std::exit(kExitOk);
-  }
+      "seed", po::value(&options.study.seed)->value_name("S"), "of what a case draws at random");
+  line.hidden.add_options()("case", po::value(&options.case_name));
+  line.positional.add("case", 1);
+  line.print_help = [&line] { PrintHelp(line.visible); };
+  ParseCommandLine(argc, argv, line);
   if (options.study.jobs < 1 || options.study.jobs > 1024) {
     throw StartError(kExitUsage, "--jobs: 1 to 1024 is expected");
   }
@@ -101,9 +91,8 @@ Options Parse(int argc, char** argv) {
 int Run(int argc, char** argv) {
   const Options options = Parse(argc, argv);
   const std::vector<Case> cases = Cases();
-  const auto study = std::find_if(cases.begin(), cases.end(), [&](const Case& known) {
-    return known.name == options.case_name;
-  });
+  const auto named = [&](const Case& known) { return known.name == options.case_name; };
+  auto study = std::find_if(cases.begin(), cases.end(), named);
   if (study == cases.end()) {
     const std::string complaint =
         options.case_name.empty() ? "a case is required" : "there is no case " + options.case_name;
@@ -111,6 +100,12 @@ int Run(int argc, char** argv) {
   }
   const Table table =
       options.cases.empty() ? study->grid(options.quick) : Table::Load(options.cases);
+  study = std::find_if(study, cases.end(), [&](const Case& known) {
+    return named(known) && (!known.takes || known.takes(table));
+  });
+  if (study == cases.end()) {
+    throw ConfigError(table.name() + ": the columns are of no row format of " + options.case_name);
+  }
   // Tried before the work, which may be long; what the file holds is kept until there is something
   // new.
   if (!options.out.empty() && !std::ofstream(options.out, std::ios::app)) {
@@ -134,7 +129,11 @@ int Run(int argc, char** argv) {
     report << " " << result.Count(status) << " " << StatusName(status);
   }
   report << "\n";
-  return result.Count(RowStatus::kMissed) == 0 ? kExitOk : kExitFault;
+  // Rows of a table answer for what they expect, those of the own grid for each other.
+  const bool judged = options.cases.empty() && study->judge;
+  const std::size_t bars_missed =
+      judged ? study->judge(result.rows, result.outcomes, report) : std::size_t{0};
+  return result.Count(RowStatus::kMissed) + bars_missed == 0 ? kExitOk : kExitFault;
 }
 
 }  // namespace

@@ -46,9 +46,9 @@ void Compare(const Case& study, const Row& row, Outcome& outcome) {
     const auto expected = row.Find(column);
     if (!expected) continue;
     try {
-      if (!Agrees(study.results[i], *expected, outcome.values.at(i))) {
-        outcome.status = RowStatus::kMissed;
-      }
+      const bool agrees = study.agrees ? study.agrees(row, outcome, i)
+                                       : Agrees(study.results[i], *expected, outcome.values.at(i));
+      if (!agrees) outcome.status = RowStatus::kMissed;
     } catch (const std::invalid_argument&) {
       row.Refuse(column, "a number is expected");
     }
@@ -89,6 +89,14 @@ std::size_t StudyResult::Count(RowStatus status) const {
   return static_cast<std::size_t>(
       std::count_if(outcomes.begin(), outcomes.end(),
                     [status](const Outcome& outcome) { return outcome.status == status; }));
+}
+
+double ExpectedNumber(const Row& row, std::string_view column) {
+  try {
+    return ParseNumber(row.Text(column));
+  } catch (const std::invalid_argument&) {
+    row.Refuse(column, "a number is expected");
+  }
 }
 
 StudyResult RunStudy(const Case& study, const Table& table, const StudyOptions& options) {
@@ -135,7 +143,11 @@ void WriteStudy(const Case& study, const StudyResult& result, std::ostream& out)
   for (const Outcome& outcome : result.outcomes) {
     std::vector<std::string> fields;
     for (std::size_t i = 0; i < study.results.size(); ++i) {
-      fields.push_back(i < outcome.values.size() ? ToField(outcome.values[i]) : "");
+      const std::size_t values = outcome.values.size();
+      const std::size_t text = i - values;  // read only where i >= values
+      fields.push_back(i < values                    ? ToField(outcome.values[i])
+                       : text < outcome.texts.size() ? outcome.texts[text]
+                                                     : "");
     }
     fields.emplace_back(StatusName(outcome.status));
     extra.push_back(std::move(fields));

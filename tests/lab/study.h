@@ -31,7 +31,8 @@ struct ResultColumn {
 /// What one row gave.
 struct Outcome {
   RowStatus status = RowStatus::kOk;
-  std::vector<double> values;  // one per result column; empty where nothing could be computed
+  std::vector<double> values = {};  // one per result column; empty where nothing could be computed
+  std::vector<std::string> texts = {};  // of the result columns after those, which are no numbers
 };
 
 /// One experiment of the laboratory. Each is a file of its own; main.cpp lists them.
@@ -40,16 +41,30 @@ struct Case {
   std::string purpose;  // one line for --help
   std::vector<ResultColumn> results;
 
-  /// The rows that are run when no table is given.
+  /// Whether a table has the rows of this case. Cases with several row formats are several of one
+  /// name, of which the first that takes the table runs it. Empty = takes any.
+  std::function<bool(const Table& table)> takes;
+
+  /// The rows that are run when no table is given: of several Cases of one name, those of the first.
   std::function<Table(bool quick)> grid;
 
   /// Computes one row: a pure function of its arguments, called from several threads. Throws
   /// ConfigError where the row makes no sense. Never returns kMissed: the study compares.
   std::function<Outcome(const Row& row, std::uint64_t seed)> run;
 
+  /// Whether result `index` is what the row expects of it, where more than the column's tolerance
+  /// decides. Empty = that alone.
+  std::function<bool(const Row& row, const Outcome& outcome, std::size_t index)> agrees;
+
   /// Prints what the rows say together.
   std::function<void(const Table& rows, const std::vector<Outcome>& outcomes, std::ostream& out)>
       summarise;
+
+  /// Holds the rows of the case's own grid against each other: names every bar that is missed and
+  /// returns how many are. May be absent.
+  std::function<std::size_t(const Table& rows, const std::vector<Outcome>& outcomes,
+                            std::ostream& out)>
+      judge;
 };
 
 struct StudyOptions {
@@ -71,6 +86,9 @@ StudyResult RunStudy(const Case& study, const Table& table, const StudyOptions& 
 
 /// The rows as they were read, with the columns got_... and got_status appended.
 void WriteStudy(const Case& study, const StudyResult& result, std::ostream& out);
+
+/// The number that a row expects in a result column, which may be inf or nan. Throws ConfigError.
+double ExpectedNumber(const Row& row, std::string_view column);
 
 /// How far a number may lie from the true one just because it was written with at least nine
 /// significant digits, trailing zeros left out: half a unit of its last digit. Throws

@@ -100,6 +100,28 @@ TEST_CASE("neither threads nor shards change a row") {
   CHECK(joined == whole);
 }
 
+TEST_CASE("a case may judge for itself, and give results that are no numbers") {
+  Case study = Squares();
+  study.results.push_back({.name = "parity"});
+  study.run = [](const Row& row, std::uint64_t) {
+    const int a = row.Integer("a", 0, 100);
+    return Outcome{.values = {1.0 * a * a}, .texts = {a % 2 == 0 ? "even" : "odd"}};
+  };
+  study.agrees = [](const Row& row, const Outcome& outcome, std::size_t index) {
+    return index == 0 ? ExpectedNumber(row, "square") <= outcome.values[0]
+                      : row.Text("parity") == outcome.texts[0];
+  };
+  const auto run = [&](const std::string& text) {
+    std::ostringstream out;
+    WriteStudy(study, RunStudy(study, Parse(text), {}), out);
+    return out.str();
+  };
+  CHECK(run("a,square,parity\n2,3,even\n2,5,even\n3,,even\n3,8,odd\n2,nan,\n") ==
+        "a,square,parity,got_square,got_parity,got_status\n2,3,even,4,even,ok\n"
+        "2,5,even,4,even,missed\n3,,even,9,odd,missed\n3,8,odd,9,odd,ok\n2,nan,,4,even,missed\n");
+  CHECK_THROWS_AS(run("a,square\n2,much\n"), ConfigError);
+}
+
 TEST_CASE("the seed reaches the case") {
   CHECK(Run("a\n2\n", {.seed = 5}) == "a,got_square,got_status\n2,8,ok\n");
 }

@@ -38,6 +38,8 @@ class Row {
   /// Throws a ConfigError that names file, line, column and value of this row.
   [[noreturn]] void Refuse(std::string_view column, const std::string& why) const;
 
+  const Table& table() const { return *table_; }
+
  private:
   double Parse(std::string_view column, const std::string& text) const;
 

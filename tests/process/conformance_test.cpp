@@ -45,14 +45,20 @@ TEST_CASE("haptic_server passes protocol_check --strict, its hand at rest") {
 }
 
 TEST_CASE(
-    "world_server passes protocol_check --strict, with a box that is fixed, and one that moves") {
-  const bool fixed = GENERATE(true, false);
-  const std::string scene = fixed ? "config/scenes/conformance.sdf" : "config/scenes/push.sdf";
-  INFO(scene);
+    "world_server passes protocol_check --strict, with a box that is fixed, and one that moves, by "
+    "impulses and as a local body") {
+  const auto [name, coupling] = GENERATE(table<const char*, const char*>({
+      {"conformance.sdf", "impulse"},
+      {"push.sdf", "impulse"},
+      {"push.sdf", "local"},
+  }));
+  const std::string scene = std::string("config/scenes/") + name;
+  INFO(scene << ", coupling " << coupling);
   const Instance owned;
   const std::string instance = owned;
   const Child world({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
-                     "--instance", instance, "--set", "scene.file=" + SourceFile(scene)});
+                     "--instance", instance, "--set", "scene.file=" + SourceFile(scene), "--set",
+                     std::string("coupling.coupling=") + coupling});
   CHECK(Check(instance, {"--as", "haptic"}) == 0);
 }
 

@@ -79,7 +79,14 @@ protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::Impu
 /// The promises that hold at every tick, whatever happens to the world.
 void CheckSafe(const TickWatch& watch);
 
-/// Waits until nothing is under way and checks that the haptic side's books balance to the unit.
-protocol::Books SettledBooks(const protocol::PeerView& haptic);
+/// What the finger presses against.
+enum class Pushed {
+  kMovable,
+  kFixed,  // the ground may have it all (SPEC.md 7.2-10), and the books of bodies stay empty
+};
+
+/// Waits until nothing is under way and checks that the haptic side's books balance to the unit, and
+/// that something stands in them.
+protocol::Books SettledBooks(const protocol::PeerView& haptic, Pushed pushed = Pushed::kMovable);
 
 }  // namespace rikiseki::test

@@ -110,10 +110,10 @@ TEST_CASE("an SDF that names no world, and one with a shape of nonsense size") {
                {negative.path() + ":4", "box", "above 0"});
 }
 
-TEST_CASE("a coupling that is not built names those that are") {
+TEST_CASE("a coupling that does not exist names those that do") {
   CheckOneLine(Run({Program("world_server"), "--config", SourceFile("config/world_server.ini"),
-                    "--set", "coupling.coupling=local"}),
-               {"coupling.coupling", "local", "impulse"});
+                    "--set", "coupling.coupling=magic"}),
+               {"coupling.coupling", "magic", "position", "impulse", "local"});
 }
 
 TEST_CASE("a wrong command line exits 64") {

@@ -31,6 +31,9 @@ enum class HapticFault {
   kBooksAnyAck,
   kNoThreeFrames,
   kOverCap,
+  kNoClock,          // holds neither stamps nor counters against one
+  kChannelForFixed,  // of what is the ground's
+  kLosesLocal,       // the surface of a body that it may move by itself
 };
 
 enum class WorldFault {
@@ -53,6 +56,11 @@ enum class WorldFault {
   kNoSecondLook,
   kIgnoresHash,
   kPublishBeforeWrite,
+  kNoClock,       // holds neither stamps nor counters against one
+  kSaysFixed,     // of a body that can move
+  kLocalInstead,  // a local body that is elsewhere
+  kRestsDeep,     // a gap that counts from where bodies begin to touch
+  kContactTwice,  // with either of its two bodies
 };
 
 class MiniHaptic {

@@ -100,6 +100,7 @@ struct Haptic {
   Vector position{-0.05, 0, 0};
   Vector displayed_force{};
   GroundChannel ground;
+  Vector ground_force{};  // on the world
   std::array<double, 3> ground_rest{};
   double gain = 0;
 
@@ -166,7 +167,9 @@ bool Haptic::ReadFrame(WorldFrame& fresh) {
     if (!ReadCarelessly(ring, number, looks, fresh)) return false;
     careless_number = number;
   } else {
-    const ReadStatus status = reader.ReadLatest(fresh);
+    const auto now = static_cast<std::uint64_t>(MonotonicNow());
+    const ReadStatus status =
+        reader.ReadLatest(fresh, fault == HapticFault::kNoClock ? kNoClock : now);
     if (status == ReadStatus::kRejected) {
       ++rejected;
       segment->CountRejected(rejected);
@@ -234,6 +237,7 @@ void Haptic::WatchWorld(std::int64_t now, bool fresh) {
 Vector Haptic::Render() {
   gain = live ? std::min(1.0, gain + 1 / kSoftTicks) : std::max(0.0, gain - 1 / kFadeTicks);
   for (Account& account : accounts) account.force = Vector{};
+  ground_force = {};
   Vector wanted{};
   for (std::uint32_t i = 0; i < frame.plane_count && shown_epoch != 0; ++i) {
     const Plane& plane = frame.planes[i];
@@ -242,8 +246,10 @@ Vector Haptic::Render() {
     const auto same = [&](const Account& account) {
       return account.channel.body == plane.body && account.channel.generation == plane.generation;
     };
+    if (frame.local_body_count > 0 && fault == HapticFault::kLosesLocal) continue;
+    const bool fixed = plane.inverse_mass == 0 && fault != HapticFault::kChannelForFixed;
     auto account = std::find_if(accounts.begin(), accounts.end(), same);
-    if (account == accounts.end()) {
+    if (!fixed && account == accounts.end()) {
       if (accounts.size() == kMaxChannels) continue;
       accounts.emplace_back();
       account = accounts.end() - 1;
@@ -251,7 +257,6 @@ Vector Haptic::Render() {
       account->channel.generation = plane.generation;
       account->channel.opened_tick = tick;
     }
-    account->channel.state = ChannelState::kOpen;
     const double cap = fault == HapticFault::kOverCap ? 10 * kCap : kCap;
     Vector force = Scaled(plane.normal, gain * std::min(kStiffness * depth, cap));
     // The slew limit, on the way up; on the way down a fade is slower than it.
@@ -260,9 +265,14 @@ Vector Haptic::Render() {
     if (Norm(force) > before + step) force = Scaled(force, (before + step) / Norm(force));
     if (fault == HapticFault::kOverCap) force = Scaled(force, 4);
     if (fault == HapticFault::kPulls) force = Scaled(force, -1);
+    wanted = Sum(wanted, force);
+    if (fixed) {
+      ground_force = Sum(ground_force, Scaled(force, -1));
+      continue;
+    }
+    account->channel.state = ChannelState::kOpen;
     account->channel.contact_point = Sum(position, Scaled(plane.normal, -kRadius));
     account->force = Scaled(force, -1);
-    wanted = Sum(wanted, force);
   }
   return wanted;
 }
@@ -293,8 +303,11 @@ void Haptic::Tick(std::int64_t now) {
     before[check::KeyOf(account.channel)] = {account.force, account.point};
   }
   // What was displayed for a channel that is free now is corrected for nobody.
-  ground.impulse = Plus(ground.impulse, Quantise(Scaled(orphan, correction_s), ground_rest));
+  const Vector late = Sum(orphan, ground_force);
   const Vector force = Render();
+  ground.impulse =
+      Plus(ground.impulse,
+           Quantise(Sum(Scaled(late, correction_s), Scaled(ground_force, kT)), ground_rest));
   if (!live && gain <= 0) shown_epoch = 0;
   position = Sum(
       position,

@@ -8,6 +8,7 @@
 #include <iterator>
 #include <sstream>
 
+#include "protocol/attach.h"
 #include "protocol/owner.h"
 #include "protocol/tools/check/suite.h"
 #include "tests/protocol/support.h"
@@ -103,6 +104,13 @@ TEST_CASE("the kit fails every haptic mutant in the case that is about it") {
       {HapticFault::kBooksAnyAck, "haptic/7.6-4/false-acks"},
       {HapticFault::kNoThreeFrames, "haptic/5.5-3/three-frames"},
       {HapticFault::kOverCap, "haptic/5.5-7/pressed-hard"},
+      {HapticFault::kNoClock, "haptic/9.2-8/future-stamp"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-3/mobility"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-3/contact-radius"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-3/local-mass"},
+      {HapticFault::kTakesNonsense, "haptic/9.2-2/contact-count"},
+      {HapticFault::kChannelForFixed, "haptic/7.2-10/fixed-body"},
+      {HapticFault::kLosesLocal, "haptic/7.7-9/local-body"},
   }));
   std::string text;
   const Verdict verdict = JudgedHaptic(fault, id, text);
@@ -130,11 +138,52 @@ TEST_CASE("the kit fails every world mutant in the case that is about it") {
       {WorldFault::kNoSecondLook, "world/4.3-1/second-look"},
       {WorldFault::kIgnoresHash, "world/8.2-3/hash"},
       {WorldFault::kPublishBeforeWrite, "world/4.1-2/published"},
+      {WorldFault::kNoClock, "world/9.2-8/future-stamp"},
+      {WorldFault::kSaysFixed, "world/6.2-13/mobility"},
+      {WorldFault::kLocalInstead, "world/7.7-6/local-state"},
+      {WorldFault::kRestsDeep, "world/6.2-14/resting-gaps"},
+      {WorldFault::kContactTwice, "world/6.2-15/contacts-once"},
   }));
   std::string text;
   const Verdict verdict = JudgedWorld(fault, id, text);
   INFO(id << ": " << text);
   CHECK(verdict == Verdict::kFailed);
+}
+
+TEST_CASE("what breaks a SHOULD is told, and fails strictly only") {
+  std::string text;
+  CHECK(JudgedHaptic(HapticFault::kNoClock, "haptic/9.2-9/jump", text) == Verdict::kNonStrict);
+  INFO(text);
+  CHECK(JudgedWorld(WorldFault::kNoClock, "world/9.2-9/jump", text) == Verdict::kNonStrict);
+}
+
+TEST_CASE("inspect tells what can move, and fails what contradicts itself") {
+  const auto inspected = [](WorldFault fault, std::string& text) {
+    const std::string instance = FreshInstance();
+    const MiniWorld world(instance, fault);
+    const MiniHaptic haptic(instance, HapticFault::kNone);
+    std::ostringstream out;
+    Reporter reporter(out, true);
+    for (const Role role : {Role::kHaptic, Role::kWorld}) {
+      REQUIRE(Eventually([&] {
+        return Attach({.instance = instance, .role = role, .required = {}, .owners = {}}).status ==
+               AttachStatus::kAttached;
+      }));
+    }
+    check::InspectBoth(instance, {}, reporter);
+    text = out.str();
+    return reporter.ExitStatus();
+  };
+  std::string text;
+  const int sound = inspected(WorldFault::kNone, text);
+  INFO(text);
+  CHECK(sound == 0);
+  CHECK_THAT(text, Catch::Contains("1 planes, 0 of bodies that cannot move, 0 that do not say, the "
+                                   "others yield by 1 to 1 1/kg"));
+  CHECK_THAT(text, Catch::Contains("2 local bodies, substep 1.0 ms; body 1 (generation 1) 1 kg, 1 "
+                                   "contact planes (body 0 gap 0 m)"));
+  CHECK(inspected(WorldFault::kSaysFixed, text) == 1);
+  CHECK_THAT(text, Catch::Contains("FAILED        world/6.2-13/mobility: body 1 is local"));
 }
 
 TEST_CASE("every case cites a sentence of SPEC.md, under an id of its own") {

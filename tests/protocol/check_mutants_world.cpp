@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "tests/protocol/check_mutants.h"
@@ -20,7 +21,10 @@ constexpr double kHalf = 0.03;        // m, of the box at the origin
 constexpr double kReach = 0.05;       // m, how near a finger must be for a plane
 constexpr double kMass = 1;           // kg
 constexpr double kLargestTick = 1.0;  // N s: 10 N times 100 ms
+constexpr double kApart = 0.1;        // m
+constexpr std::uint32_t kFloor = 0;
 constexpr std::uint32_t kBody = 1;
+constexpr std::uint32_t kNeighbour = 2;
 constexpr std::uint32_t kGeneration = 1;
 
 struct World {
@@ -43,6 +47,7 @@ struct World {
   void Drain();
   void Take(const HapticTick& tick);
   void Publish();
+  void AddLocalBodies(WorldFrame& message);
   void PublishBodies();
 
   const std::string instance;
@@ -151,7 +156,8 @@ bool World::Consume() {
     }
     return true;
   }
-  const ReadStatus status = reader.ReadNext(tick);
+  const auto now = static_cast<std::uint64_t>(MonotonicNow());
+  const ReadStatus status = reader.ReadNext(tick, fault == WorldFault::kNoClock ? kNoClock : now);
   if (status == ReadStatus::kFresh) {
     Take(tick);
     return true;
@@ -227,8 +233,10 @@ void World::Publish() {
     plane.normal[axis] = fault == WorldFault::kNormalInverted  ? -side
                          : fault == WorldFault::kNormalNotUnit ? 0.5 * side
                                                                : side;
+    plane.inverse_mass = fault == WorldFault::kSaysFixed ? 0 : 1 / kMass;
     message.planes[0] = plane;
     message.plane_count = 1;
+    AddLocalBodies(message);
   }
   PublishMessage(frames, message, fault == WorldFault::kPublishBeforeWrite);
   if (fault != WorldFault::kNoHeartbeat) {
@@ -240,9 +248,35 @@ void World::Publish() {
   health.lapped = lapped_before + reader.ring().lost();
   health.peer_state = heard ? PeerState::kLive : PeerState::kLost;
   health.peer_epoch = epoch;
+  health.coupling = message.coupling;
   health.applied = applied;
   PublishMessage(healths, health, false);
   PublishBodies();
+}
+
+/// The box on a floor, and a neighbour.
+void World::AddLocalBodies(WorldFrame& message) {
+  message.coupling = Coupling::kLocal;
+  message.local_body_count = 2;
+  message.local_substep_ns = 1'000'000;
+  const auto fill = [&](std::uint32_t i, std::uint32_t number, std::uint32_t other) {
+    LocalBody& body = message.local_bodies[i];
+    body.body = number;
+    body.generation = kGeneration;
+    body.mass = kMass;
+    body.position = {0, i * kApart, 0};
+    body.contact_count = 1;
+    ContactPlane& contact = body.contacts[0];
+    contact.other_body = other;
+    contact.other_generation = kGeneration;
+    contact.normal = {0, 0, 1};
+    contact.impulse = {0, 0, 0.01};
+    contact.gap = fault == WorldFault::kRestsDeep ? -0.001 : 0;
+  };
+  fill(0, kBody, fault == WorldFault::kContactTwice ? kNeighbour : kFloor);
+  fill(1, kNeighbour, kBody);
+  message.local_bodies[0].velocity = {velocity, 0, 0};
+  if (fault == WorldFault::kLocalInstead) message.local_bodies[1].position[0] = 0.01;
 }
 
 void World::PublishBodies() {
@@ -251,8 +285,13 @@ void World::PublishBodies() {
   body.generation = kGeneration;
   body.mass = kMass;
   body.velocity = {velocity, 0, 0};
-  std::vector<std::uint64_t> words(WorldBodiesBytes(1) / 8);
-  const Encoded shape = Encode(std::span<const Body>(&body, 1), words);
+  Body neighbour = body;
+  neighbour.body = kNeighbour;
+  neighbour.position = {0, kApart, 0};
+  neighbour.velocity = {};
+  const std::array<Body, 2> both{body, neighbour};
+  std::vector<std::uint64_t> words(WorldBodiesBytes(2) / 8);
+  const Encoded shape = Encode(std::span<const Body>(both), words);
   bodies.Publish(words, shape, static_cast<std::uint64_t>(MonotonicNow()));
 }
 

@@ -19,7 +19,7 @@ using test::Generator;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-using Words = std::array<std::uint64_t, 1700>;
+using Words = std::array<std::uint64_t, 1800>;
 static_assert(sizeof(Words) >= kWorldFrameBytes && sizeof(Words) >= kHapticHealthBytes);
 
 template <typename Message>
@@ -98,14 +98,20 @@ TEST_CASE("a message is as long as what it uses") {
   frame.local_body_count = 1;
   grows_by(16 + 224, 31);
   frame.local_bodies[0].contact_count = 1;
-  grows_by(128, 31);
+  grows_by(136, 31);
+  frame.planes[5].inverse_mass = 0;  // "it cannot move" is no default
+  grows_by(32 * 8, 31 | kFrameMobility);
   frame.local_body_count = kMaxLocalBodies;
   for (LocalBody& body : frame.local_bodies) body.contact_count = kMaxContactPlanes;
   CHECK(Encode(frame, words).used_bytes == kWorldFrameBytes);
   HapticHealth health;
-  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24);
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24 - 32);
   health.reconciliation.frames = 1;
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 32);
+  health.energy.injected = -1e-9;
   CHECK(Encode(health, words).used_bytes == kHapticHealthBytes);
+  health.reconciliation.frames = 0;
+  CHECK(Encode(health, words).used_bytes == kHapticHealthBytes - 24);
   WorldScene scene;
   CHECK(Encode(scene, words).used_bytes == 120);
   scene.bodies.resize(2);
@@ -144,12 +150,13 @@ TEST_CASE("fields lie where SPEC.md section 6 puts them") {
   CHECK(at(80 + 2 * 88 + 144 + 2 * 80 + 16, std::int64_t{}) == 10);  // ground, J z
   WorldFrame frame = Generator(4).Frame();
   frame.plane_count = 2;
-  frame.planes[1] = {3, 4, 5, 6, {7, 8, 9}, {0, 0, 1}, 10, 11, {12, 13, 14}, 15, 16, 17};
+  frame.planes[1] = {3, 4, 5, 6, {7, 8, 9}, {0, 0, 1}, 10, 11, {12, 13, 14}, 15, 16, 17, 21};
   frame.local_body_count = 2;
   frame.local_bodies[0].contact_count = 1;
   frame.local_bodies[1].contact_count = 2;
   frame.local_bodies[1].mass = 18;
   frame.local_bodies[1].contacts[1].gap = 19;
+  frame.local_bodies[1].contacts[1].radius = 20;
   Encode(frame, words);
   CHECK(at(32, std::uint64_t{}) == frame.acked_tick);
   CHECK(at(100, std::uint32_t{}) == 2);
@@ -163,7 +170,10 @@ TEST_CASE("fields lie where SPEC.md section 6 puts them") {
   const std::size_t local = velocities + 2 * 24 + 2 * 16 + 2 * 8;
   CHECK(at(local, std::uint32_t{}) == 2);
   CHECK(at(local + 16 + 224 + 16, double{}) == 18);
-  CHECK(at(local + 16 + 2 * 224 + 2 * 128 + 56, double{}) == 19);  // second contact of the second
+  const std::size_t contact = local + 16 + 2 * 224 + 2 * 136;  // the second of the second body
+  CHECK(at(contact + 56, double{}) == 19);
+  CHECK(at(contact + 128, double{}) == 20);
+  CHECK(at(contact + 136 + 8, double{}) == 21);  // behind the local bodies: the second mobility
 }
 
 TEST_CASE("impossible counts and short buffers are not encoded") {
@@ -246,7 +256,7 @@ TEST_CASE("a nonsensical tick is refused") {
           {"pointer huge", [](auto& m) { m.pointers[1].pointer = ~0u; }, S::kIdentity},
           {"pointer twice", [](auto& m) { m.pointers[1].pointer = m.pointers[0].pointer; },
            S::kIdentity},
-          {"reason 15", [](auto& m) { m.pointers[0].reason = static_cast<ForceReason>(15); },
+          {"reason 18", [](auto& m) { m.pointers[0].reason = static_cast<ForceReason>(18); },
            S::kEnumerator},
           {"radius", [](auto& m) { m.pointers[0].radius = kNaN; }, S::kNotFinite},
           {"radius < 0", [](auto& m) { m.pointers[0].radius = -1e-9; }, S::kRange},
@@ -326,6 +336,16 @@ TEST_CASE("a nonsensical frame is refused") {
           {"recovery", [](auto& m) { m.planes[1].recovery_s = kNaN; }, S::kNotFinite},
           {"recovery < 0", [](auto& m) { m.planes[1].recovery_s = -1; }, S::kRange},
           {"recovery 11 s", [](auto& m) { m.planes[1].recovery_s = 11; }, S::kRange},
+          {"mobility", [](auto& m) { m.planes[1].inverse_mass = kNaN; }, S::kNotFinite},
+          {"mobility infinite", [](auto& m) { m.planes[1].inverse_mass = kInfinity; },
+           S::kNotFinite},
+          {"mobility < 0", [](auto& m) { m.planes[1].inverse_mass = -1e-9; }, S::kRange},
+          {"mobility nearly not said",
+           [](auto& m) { m.planes[1].inverse_mass = std::nextafter(kMobilityNotSaid, 0); },
+           S::kRange},
+          {"mobility below not said",
+           [](auto& m) { m.planes[1].inverse_mass = std::nextafter(kMobilityNotSaid, -2); },
+           S::kRange},
       });
 }
 
@@ -376,6 +396,8 @@ TEST_CASE("a nonsensical local body is refused") {
           {"other mass", contact([](auto& c) { c.other_inverse_mass = kNaN; }), S::kNotFinite},
           {"other mass < 0", contact([](auto& c) { c.other_inverse_mass = -1; }), S::kRange},
           {"impulse", contact([](auto& c) { c.impulse[1] = kNaN; }), S::kNotFinite},
+          {"rounding", contact([](auto& c) { c.radius = kNaN; }), S::kNotFinite},
+          {"rounding < 0", contact([](auto& c) { c.radius = -1e-9; }), S::kRange},
       });
 }
 
@@ -389,7 +411,8 @@ TEST_CASE("counts within the block of local bodies bound what is read") {
   const Encoded right = Encode(sound, words);
   const std::uint32_t contacts_sent =
       sound.local_bodies[0].contact_count + sound.local_bodies[1].contact_count;
-  const std::uint32_t local = right.used_bytes - 16 - 2 * 224 - 128 * contacts_sent;
+  const std::uint32_t mobilities = (right.blocks & kFrameMobility) != 0 ? 8 * sound.plane_count : 0;
+  const std::uint32_t local = right.used_bytes - mobilities - 16 - 2 * 224 - 136 * contacts_sent;
   const auto with = [&](std::uint32_t offset, std::uint32_t value, Encoded encoded) {
     Words spoiled = words;
     std::memcpy(reinterpret_cast<char*>(spoiled.data()) + offset, &value, sizeof value);
@@ -412,7 +435,28 @@ TEST_CASE("counts within the block of local bodies bound what is read") {
           DecodeStatus::kLength);
   }
   // Behind the block that this version knows last, a later one may put more.
-  CHECK(with(local, 2, {right.used_bytes + 40, right.blocks | 32}) == DecodeStatus::kOk);
+  CHECK(with(local, 2, {right.used_bytes + 40, right.blocks | 64}) == DecodeStatus::kOk);
+}
+
+TEST_CASE("a frame that says no mobility leaves every plane's not said, and 0 is not the same") {
+  Words words{};
+  WorldFrame frame;
+  frame.frame = 1;
+  frame.period_ns = 1;
+  frame.plane_count = 2;
+  frame.planes[0].normal = frame.planes[1].normal = {0, 0, 1};
+  WorldFrame got;
+  got.planes[0].inverse_mass = 77;
+  Encoded encoded = Encode(frame, words);
+  CHECK(encoded.blocks == 0);
+  REQUIRE(Decode(words, encoded, got) == DecodeStatus::kOk);
+  CHECK(got.planes[0].inverse_mass == kMobilityNotSaid);
+  frame.planes[1].inverse_mass = 0;
+  encoded = Encode(frame, words);
+  CHECK(encoded.blocks == kFrameMobility);
+  REQUIRE(Decode(words, encoded, got) == DecodeStatus::kOk);
+  CHECK(got.planes[0].inverse_mass == kMobilityNotSaid);
+  CHECK(got.planes[1].inverse_mass == 0);
 }
 
 TEST_CASE("scenes come back as they were sent") {
@@ -508,7 +552,7 @@ TEST_CASE("nonsensical health is refused") {
   CheckRefused<HapticHealth>(
       Generator(7).Haptic(),
       {
-          {"reason", [](auto& m) { m.reason = static_cast<ForceReason>(15); }, S::kEnumerator},
+          {"reason", [](auto& m) { m.reason = static_cast<ForceReason>(18); }, S::kEnumerator},
           {"peer", [](auto& m) { m.peer_state = static_cast<PeerState>(6); }, S::kEnumerator},
           {"force", [](auto& m) { m.largest_force = kNaN; }, S::kNotFinite},
           {"step", [](auto& m) { m.largest_force_step = kNaN; }, S::kNotFinite},
@@ -524,6 +568,11 @@ TEST_CASE("nonsensical health is refused") {
              m.reconciliation = Reconciliation{1, 1, -1};
            },
            S::kRange},
+          {"injected", [](auto& m) { m.energy.injected = kNaN; }, S::kNotFinite},
+          {"dissipated", [](auto& m) { m.energy.dissipated = kInfinity; }, S::kNotFinite},
+          {"dissipated < 0", [](auto& m) { m.energy.dissipated = -1e-9; }, S::kRange},
+          {"unstable", [](auto& m) { m.energy.unstable = 2; }, S::kEnumerator},
+          {"controller", [](auto& m) { m.energy.controller = 2; }, S::kEnumerator},
           {"period", [](auto& m) { m.period_ns = 0; }, S::kRange},
       });
   CheckRefused<WorldHealth>(
@@ -640,7 +689,8 @@ bool AllFinite(const WorldFrame& m) {
   for (std::uint32_t i = 0; i < m.plane_count; ++i) {
     for (const double x : m.planes[i].point) sum += x * 0;
     const Vector& n = m.planes[i].normal;
-    sum += (m.planes[i].stiffness + m.planes[i].damping) * 0;
+    sum += (m.planes[i].stiffness + m.planes[i].damping + m.planes[i].inverse_mass) * 0;
+    if (m.planes[i].inverse_mass < 0 && m.planes[i].inverse_mass != kMobilityNotSaid) return false;
     if (std::abs(std::hypot(n[0], n[1], n[2]) - 1) > 1e-12) return false;
   }
   for (std::uint32_t i = 0; i < m.local_body_count; ++i) {
@@ -655,7 +705,8 @@ bool AllFinite(const WorldFrame& m) {
       for (const auto& v : {c.point, c.normal, c.other_velocity, c.impulse}) {
         for (const double x : v) sum += x * 0;
       }
-      sum += (c.gap + c.friction + c.other_inverse_mass) * 0;
+      sum += (c.gap + c.friction + c.other_inverse_mass + c.radius) * 0;
+      if (c.radius < 0) return false;
     }
   }
   return std::isfinite(sum);
@@ -675,7 +726,7 @@ TEST_CASE("whatever the bytes are, what is accepted is finite and within bounds"
       frame_words = words;
       words[9] = (random() % 18) << 32 | random() % 6;
       tick_encoded = {static_cast<std::uint32_t>(random() % 600 * 8),
-                      static_cast<std::uint32_t>(random() % 32)};
+                      static_cast<std::uint32_t>(random() % 64)};
       frame_encoded = tick_encoded;
     } else {
       // A few bits flipped, the exponents' above all.

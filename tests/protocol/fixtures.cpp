@@ -98,6 +98,7 @@ HapticHealth FixtureHapticHealth() {
   m.lateness = next.Counts();
   m.duration = next.Counts();
   m.reconciliation = {next.Big(), next.Real(), next.Real()};
+  m.energy = {next.Real(), next.Real(), next.Big(), 1, 1};
   return m;
 }
 
@@ -117,7 +118,7 @@ WorldFrame FixtureFrame() {
   for (std::uint32_t i = 0; i < m.plane_count; ++i) {
     m.planes[i] = {i,           next.Small(), next.Small(), next.Small(),  next.Triple(),
                    kDirection,  next.Real(),  next.Real(),  next.Triple(), next.Real(),
-                   next.Real(), 0.25};
+                   next.Real(), 0.25,         next.Real()};
   }
   m.local_body_count = 2;
   m.local_substep_ns = 1'000'000;
@@ -135,8 +136,8 @@ WorldFrame FixtureFrame() {
     b.acceleration = next.Triple();
     b.angular_acceleration = next.Triple();
     for (std::uint32_t j = 0; j < b.contact_count; ++j) {
-      b.contacts[j] = {next.Small(), next.Small(),  next.Triple(), kDirection,   -next.Real(),
-                       next.Real(),  next.Triple(), next.Real(),   next.Triple()};
+      b.contacts[j] = {next.Small(), next.Small(),  next.Triple(), kDirection,    -next.Real(),
+                       next.Real(),  next.Triple(), next.Real(),   next.Triple(), next.Real()};
     }
   }
   return m;

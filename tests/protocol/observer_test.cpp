@@ -47,14 +47,14 @@ std::uint64_t Now() {
 TEST_CASE("every reason has a sentence and a key of its own") {
   std::set<std::string> sentences;
   std::set<std::string> keys;
-  for (std::uint32_t i = 0; i <= 14; ++i) {
+  for (std::uint32_t i = 0; i <= 17; ++i) {
     const auto reason = static_cast<ForceReason>(i);
     CHECK(Sentence(reason).back() == '.');
     CHECK(sentences.insert(Sentence(reason)).second);
     CHECK(keys.insert(Key(reason)).second);
     CHECK(Key(reason) != "unknown");
   }
-  CHECK(Key(static_cast<ForceReason>(15)) == "unknown");
+  CHECK(Key(static_cast<ForceReason>(18)) == "unknown");
 }
 
 TEST_CASE("either side may be missing, come and go") {

@@ -149,7 +149,7 @@ void Mutate(Generator& generator, Payload& payload) {
       *half = 0xFFFFFFFF - generator.Small(3);
       break;
     case 4:
-      payload.shape.blocks ^= 1u << generator.Integer(5);
+      payload.shape.blocks ^= 1u << generator.Integer(6);
       break;
     case 5:
       payload.shape.used_bytes += 8;
@@ -429,6 +429,53 @@ TEST_CASE("a C segment is read from C++, and its life is that of SPEC.md 5") {
   for (const TemporaryFolder* used : {&folder, &other}) {
     fs::remove(used->path() + "/rikiseki." + instance + ".haptic.lock");
   }
+}
+
+TEST_CASE("a C frame says of no plane that its body cannot move, unless told to") {
+  rk_frame frame;
+  rk_frame_init(&frame);
+  frame.head.frame = 1;
+  frame.head.period_ns = 1;
+  frame.head.coupling = RK_BY_IMPULSE;
+  frame.head.plane_count = 2;
+  frame.plane[0].normal[2] = frame.plane[1].normal[2] = 1;
+  std::array<std::uint64_t, RK_FRAME_BYTES / 8> words{};
+  rk_received shape{};
+  REQUIRE(rk_encode_frame(&frame, words.data(), &shape));
+  CHECK(shape.blocks == 0);
+  WorldFrame got;
+  REQUIRE(Decode(words, {shape.used_bytes, shape.blocks}, got) == DecodeStatus::kOk);
+  CHECK(got.planes[1].inverse_mass == kMobilityNotSaid);
+  frame.mobility[1].inverse_mass = 0;
+  REQUIRE(rk_encode_frame(&frame, words.data(), &shape));
+  CHECK(shape.blocks == RK_FRAME_MOBILITY);
+  REQUIRE(Decode(words, {shape.used_bytes, shape.blocks}, got) == DecodeStatus::kOk);
+  CHECK(got.planes[0].inverse_mass == kMobilityNotSaid);
+  CHECK(got.planes[1].inverse_mass == 0);
+}
+
+// SPEC.md 9.2-9: 4 (elapsed / period + slot_count) messages may have come, no more.
+TEST_CASE("rk_jumped tells a counter that jumps from one that was only not looked at") {
+  constexpr std::uint64_t kMs = 1'000'000;
+  rk_reader reader{};
+  reader.slot_count = 16;
+  reader.period_ns = kMs;
+  reader.cursor = 1'000'000;
+  std::uint64_t now_ns = 5 * kMs;
+  CHECK_FALSE(rk_jumped(&reader, now_ns));  // the first look knows of nothing before
+  now_ns += 10 * kMs;
+  reader.cursor += 4 * (10 + 16);
+  CHECK_FALSE(rk_jumped(&reader, now_ns));
+  now_ns += 10 * kMs;
+  reader.cursor += 4 * (10 + 16) + 4;
+  CHECK(rk_jumped(&reader, now_ns));
+  CHECK_FALSE(rk_jumped(&reader, now_ns));  // it is counted from there
+  now_ns += 10'000 * kMs;                   // stopped for ten seconds
+  reader.cursor += 40'000;
+  CHECK_FALSE(rk_jumped(&reader, now_ns));
+  reader.period_ns = 0;  // aperiodic: nothing is too fast
+  reader.cursor += 1'000'000'000;
+  CHECK_FALSE(rk_jumped(&reader, now_ns));
 }
 
 TEST_CASE("C and C++ refuse the same headers") {

@@ -76,6 +76,7 @@ static void find_planes(rk_frame* frame, const rk_tick* tick) {
     if (distance > finger->radius + 0.03) continue;
     plane->pointer = finger->pointer;
     plane->generation = 1;
+    frame->mobility[frame->head.plane_count].inverse_mass = 0; /* 6.2-13: it cannot move */
     ++frame->head.plane_count;
   }
 }
@@ -109,6 +110,7 @@ static int drain(peer* haptic, rk_frame* frame) {
     const enum rk_read_status read = rk_read_next(&haptic->reader, words, sizeof words, &received);
     if (read == RK_BACKWARDS) return 0;
     if (read != RK_FRESH && read != RK_REJECTED) return 1;
+    if (rk_jumped(&haptic->reader, rk_now_ns())) return 0;
     if (read == RK_FRESH &&
         rk_accept(&haptic->reader, &received, rk_decode_tick(words, sizeof words, &received, &tick),
                   rk_now_ns()) == RK_SOUND &&
@@ -136,6 +138,7 @@ int main(int argc, char** argv) {
   }
   signal(SIGTERM, stop);
   signal(SIGINT, stop);
+  rk_frame_init(&frame);
   frame.head.period_ns = kPeriodNs;
   frame.head.coupling = RK_BY_IMPULSE;
   while (!stopping) {

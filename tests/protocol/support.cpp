@@ -100,7 +100,7 @@ HapticTick Generator::Tick() {
   for (std::uint32_t i = 0; i < m.pointer_count; ++i) {
     Pointer& p = m.pointers[i];
     p.pointer = kMaxPointers - 1 - i;
-    p.reason = static_cast<ForceReason>(Integer(14));
+    p.reason = static_cast<ForceReason>(Integer(17));
     p.radius = Positive();
     p.position = Triple();
     p.velocity = Triple();
@@ -129,7 +129,7 @@ HapticHealth Generator::Haptic() {
     *word = engine_();
   }
   m.period_ns = 1 + Integer(10'000'000);
-  m.reason = static_cast<ForceReason>(Integer(14));
+  m.reason = static_cast<ForceReason>(Integer(17));
   m.peer_state = static_cast<PeerState>(Integer(5));
   m.largest_force = Real();
   m.largest_force_step = Real();
@@ -141,6 +141,7 @@ HapticHealth Generator::Haptic() {
   for (auto& count : m.lateness) count = engine_();
   for (auto& count : m.duration) count = engine_();
   if (Integer(1) == 1) m.reconciliation = {1 + Integer(99), Positive(), Positive()};
+  if (Integer(1) == 1) m.energy = {Real(), Positive(), engine_(), Small(1), Small(1)};
   return m;
 }
 
@@ -171,6 +172,11 @@ WorldFrame Generator::Frame() {
     m.planes[i].dynamic_friction = Positive();
     m.planes[i].recovery_s = Positive();
   }
+  const bool mobility = Integer(1) == 1;
+  for (std::uint32_t i = 0; mobility && i < m.plane_count; ++i) {
+    constexpr double kSaid[] = {0, kMobilityNotSaid};
+    m.planes[i].inverse_mass = Integer(1) == 1 ? Positive() : kSaid[Integer(1)];
+  }
   if (Integer(1) == 1) {
     m.local_body_count = 1 + Small(kMaxLocalBodies - 1);
     m.local_substep_ns = 1 + Integer(10'000'000);
@@ -194,7 +200,7 @@ LocalBody Generator::OneLocalBody(std::uint32_t body) {
   b.contact_count = Small(kMaxContactPlanes);
   for (std::uint32_t i = 0; i < b.contact_count; ++i) {
     b.contacts[i] = {Small(99),  Small(99), Triple(),   Direction(), Real(),
-                     Positive(), Triple(),  Positive(), Triple()};
+                     Positive(), Triple(),  Positive(), Triple(),    Positive()};
   }
   return b;
 }

@@ -45,7 +45,7 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
   std::stringstream text;
   text << file.rdbuf();
   CHECK(KeysOf(text.str(), true) == KeysOf(description, false));
-  CHECK(KeysOf(text.str(), true).size() == 8);
+  CHECK(KeysOf(text.str(), true).size() == 9);
 
   const Settings defaults;
   CHECK(shipped.loop.rate_hz == defaults.loop.rate_hz);
@@ -55,6 +55,7 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
   CHECK(shipped.coupling.force_cap_n == defaults.coupling.force_cap_n);
   CHECK(shipped.coupling.gap_ms == defaults.coupling.gap_ms);
   CHECK(shipped.features.radius_mm == defaults.features.radius_mm);
+  CHECK(shipped.features.finger_friction == defaults.features.finger_friction);
   CHECK(std::filesystem::exists(shipped.scene.file));
 }
 
@@ -62,7 +63,7 @@ TEST_CASE("every key reaches its setting") {
   const Settings settings = LoadSettings(
       kShipped, {"loop.rate_hz=50", "scene.file=/a/b.sdf", "physics.substep_ms=2",
                  "coupling.coupling=position", "coupling.replay=lump", "coupling.force_cap_n=7",
-                 "coupling.gap_ms=250", "features.radius_mm=33"});
+                 "coupling.gap_ms=250", "features.radius_mm=33", "features.finger_friction=0.5"});
   CHECK(settings.period_ns() == 20'000'000);
   CHECK(settings.scene.file == "/a/b.sdf");
   CHECK(settings.physics.substep_ms == 2);
@@ -71,6 +72,7 @@ TEST_CASE("every key reaches its setting") {
   CHECK(settings.coupling.force_cap_n == 7);
   CHECK(settings.gap_s() == 0.25);
   CHECK(settings.features.radius_mm == 33);
+  CHECK(settings.features.finger_friction == 0.5);
 }
 
 TEST_CASE("the gap follows the rate where it is not given") {

@@ -34,14 +34,15 @@ struct Candidate {
 
 }  // namespace
 
-std::vector<Finger> FingersOf(const protocol::HapticTick& tick) {
+std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction) {
   std::vector<Finger> fingers;
   const std::size_t count = std::min(tick.pointer_count, protocol::kMaxPointers);
   for (const protocol::Pointer& pointer : std::span(tick.pointers).first(count)) {
     const Finger finger{.pointer = pointer.pointer,
                         .radius_m = pointer.radius,
                         .position = ToVec3(pointer.position),
-                        .velocity = ToVec3(pointer.velocity)};
+                        .velocity = ToVec3(pointer.velocity),
+                        .friction = friction};
     const bool sound = finger.pointer < protocol::kMaxPointers && finger.radius_m >= 0 &&
                        finger.radius_m <= kLargestFinger && Usable(finger.position) &&
                        Usable(finger.velocity);
@@ -83,8 +84,15 @@ std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
                        .normal = ToArray(Vec3(pose_WS.orientation * nearest.normal)),
                        .stiffness = collider.stiffness_n_per_m.value_or(0),
                        .damping = collider.damping_ns_per_m.value_or(0),
+                       .recovery_s = collider.recovery_s,
                        .inverse_mass = Mobility(scene.bodies[body], state, point,
                                                 pose_WS.orientation * nearest.normal)};
+        if (finger.friction > 0 && collider.friction > 0) {
+          const double static_friction = collider.static_friction.value_or(collider.friction);
+          found.plane.velocity = ToArray(surface_velocity);
+          found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);
+          found.plane.static_friction = std::sqrt(finger.friction * static_friction);
+        }
       }
     }
   }

@@ -25,15 +25,19 @@ struct Finger {
   double radius_m = 0;
   Vec3 position = Vec3::Zero();  // of the sphere's centre, in W
   Vec3 velocity = Vec3::Zero();  // m/s
+  double friction = 0;           // Coulomb, dynamic; 0 = none
 };
 
 inline constexpr double kLargestFinger = 1.0;  // m
 
-/// The usable fingers of a message, each pointer once; what is not finite is left out.
-std::vector<Finger> FingersOf(const protocol::HapticTick& tick);
+/// The usable fingers of a message, each pointer once, all with `friction`; what is not finite is
+/// left out.
+std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction = 0);
 
 /// Fills `planes` nearest first, at most its length, and returns how many. A plane's feature is the
-/// place of its collider within the body. `states` and `generations` go with `scene.bodies`.
+/// place of its collider within the body. Friction of finger and surface combines as sqrt(mu1 mu2),
+/// the static one with the finger's dynamic one likewise; where there is none, neither it nor the
+/// material's velocity is filled in. `states` and `generations` go with `scene.bodies`.
 std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
                          std::span<const std::uint32_t> generations,
                          std::span<const Finger> fingers, const FeatureReach& reach,

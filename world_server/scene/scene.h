@@ -37,6 +37,8 @@ struct Collider {
   double friction = 1;                           // Coulomb; two surfaces combine as sqrt(mu1 mu2)
   std::optional<double> stiffness_n_per_m = {};  // rendered, where the scene says so
   std::optional<double> damping_ns_per_m = {};
+  std::optional<double> static_friction = {};  // for the finger; none = as `friction`
+  double recovery_s = 0;  // its force takes this long to come and go; 0 = the haptic side's own
 };
 
 struct SceneBody {

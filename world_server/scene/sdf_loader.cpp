@@ -13,6 +13,7 @@
 
 #include "common/config.h"
 #include "protocol/messages.h"
+#include "world_server/scene/sdf_extensions.h"
 #include "world_server/scene/sdf_survey.h"
 
 namespace rikiseki::world {
@@ -329,6 +330,7 @@ class Loader {
                                         "collisions of a moving link the same");
       }
       ReadCompliance(collision.Element(), collider, loaded_.warnings);
+      ReadSurfaceExtensions(collision.Element(), collider);
       body.colliders.push_back(collider);
     }
     if (loaded_.scene.bodies.size() == protocol::kMaxBodies) {

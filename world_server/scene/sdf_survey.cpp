@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "common/config.h"
+#include "world_server/scene/sdf_extensions.h"
 
 namespace rikiseki::world {
 namespace {
@@ -121,6 +122,10 @@ void Survey(const sdf::ElementPtr& parent, bool is_static, std::vector<std::stri
   }
   for (auto child = parent->GetFirstElement(); child; child = child->GetNextElement()) {
     if (!child->GetExplicitlySetInFile()) continue;
+    if (IsExtension(child)) {
+      CheckExtension(parent, child);
+      continue;
+    }
     const std::string path = parent->GetName() + "/" + child->GetName();
     const auto found = Treatments().find(path);
     if (found == Treatments().end()) {

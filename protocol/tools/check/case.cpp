@@ -38,6 +38,15 @@ void Require(bool condition, const std::string& text) {
   if (!condition) Fail(text);
 }
 
+void AsShould(const std::function<void()>& judge) {
+  try {
+    judge();
+  } catch (const Outcome& outcome) {
+    if (outcome.verdict == Verdict::kFailed) NotStrict(outcome.text);
+    throw;
+  }
+}
+
 std::string NumberOf(const std::string& id) {
   const std::size_t begin = id.find('/') + 1;
   return id.substr(begin, id.find('/', begin) - begin);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,8 @@ struct Outcome {
 [[noreturn]] void Unimplemented(const std::string& text);
 /// Fail(text) unless `condition`.
 void Require(bool condition, const std::string& text);
+/// Runs what judges a SHOULD: not strict, where a MUST would have failed.
+void AsShould(const std::function<void()>& judge);
 
 template <typename Player>
 struct Case {

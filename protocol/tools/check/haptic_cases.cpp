@@ -339,12 +339,7 @@ void Monitored(WorldPlayer& player) {
 }
 
 void MonitoredSlew(WorldPlayer& player) {
-  try {
-    Monitored<kSlew>(player);
-  } catch (const Outcome& outcome) {
-    if (outcome.verdict == Verdict::kFailed) NotStrict(outcome.text);
-    throw;
-  }
+  AsShould([&] { Monitored<kSlew>(player); });
 }
 
 constexpr HapticCase kMonitorCases[] = {

@@ -12,6 +12,7 @@ using HapticCase = Case<WorldPlayer>;
 
 std::span<const HapticCase> HapticSegmentCases();   // header, liveness, ring
 std::span<const HapticCase> HapticContactCases();   // what is displayed, and booked
+std::span<const HapticCase> HapticLocalCases();     // what can move, and by whom
 std::span<const HapticCase> HapticNonsenseCases();  // what is refused
 std::span<const HapticCase> HapticEndCases();       // late, silent, dead, restarted
 std::span<const HapticCase> HapticMonitorCases();   // judged on every tick of the run

@@ -2,20 +2,22 @@
 #include <atomic>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "common/clock.h"
 #include "protocol/tools/check/haptic_cases.h"
+#include "protocol/tools/check/haptic_refusal.h"
+#include "protocol/tools/check/header_cases.h"
 
 namespace rikiseki::protocol::check {
 namespace {
 
 constexpr std::uint32_t kGhost = 666;   // a body that stands only in frames to be left alone
 constexpr std::int64_t kWholeNs = 400;  // how long a message stays whole: as long as a copy takes
+constexpr std::int64_t kFarFutureNs = 10'000'000'000;
+constexpr std::uint64_t kLeap = 1'000'000;  // messages: hours of frames
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-using Words = std::vector<std::uint64_t>;
-using Spoil = std::function<void(Words&, Encoded&)>;
 
 std::size_t Head(const char* field) {
   return FieldOffset("world.frame", field);
@@ -23,39 +25,6 @@ std::size_t Head(const char* field) {
 /// Of the first plane.
 std::size_t OfPlane(const char* field) {
   return RecordBytes("world.frame") + FieldOffset("world.frame/plane", field);
-}
-
-double ThereShouldBeForce(const WorldPlayer& player, const SeenTick& seen) {
-  const Plane& plane = player.planes[0];
-  const double gap = Dot(Difference(seen.position, plane.point), plane.normal) - seen.radius;
-  return gap < -0.0001 ? -gap : 0;
-}
-
-/// Three spoilt frames among good ones: none is displayed, the good ones are, the surface stays.
-void Refuses(WorldPlayer& player, const Spoil& spoil) {
-  player.Press();
-  const std::uint64_t rejected = player.peer().Counters().rejected;
-  const std::uint64_t breaches = player.monitor().breaches(kNeverShown);
-  const std::size_t from = player.seen().size();
-  for (int i = 0; i < 3; ++i) {
-    player.PublishSpoilt(player.NextFrame(), spoil);
-    player.Run(0.01);
-  }
-  player.Run(0.03);
-  const std::uint64_t good = player.frame();
-  const bool goes_on = player.Until([&] { return player.newest().world_frame > good; }, 1);
-  Require(player.monitor().breaches(kNeverShown) == breaches, "a spoilt frame was displayed");
-  for (std::size_t i = from; i < player.seen().size(); ++i) {
-    const SeenTick& seen = player.seen()[i];
-    Require(std::isfinite(Norm(seen.force)), "a force that is not finite");
-    Require(Norm(seen.force) >= kZeroForce || ThereShouldBeForce(player, seen) == 0,
-            "the surface was lost at tick " + std::to_string(seen.tick) +
-                ": the previous frame is to be kept");
-  }
-  Require(goes_on, "good frames after three spoilt ones are not displayed");
-  if (!player.Until([&] { return player.peer().Counters().rejected > rejected; }, 0.5)) {
-    Fail("the header's `rejected` does not count them");
-  }
 }
 
 void NotANumber(WorldPlayer& player) {
@@ -137,6 +106,47 @@ void Backwards(WorldPlayer& player) {
   player.writer().SetPublished(number);
   player.publishing = true;
   Detached(player, last_good, "the counter ran backwards");
+}
+
+// What the counter says could not have been published since the last look.
+void Jumps(WorldPlayer& player) {
+  player.Press();
+  const std::uint64_t last_good = player.frame();
+  player.Jump(kLeap);
+  AsShould([&] { Detached(player, last_good, "published grew by a million messages at once"); });
+}
+
+void FromTheFuture(WorldPlayer& player) {
+  Refuses(
+      player, [](Words&, Encoded&) {}, kFarFutureNs);
+}
+
+// Older than the message before: nobody may be fooled into displaying the past, but it is no MUST.
+void FromThePast(WorldPlayer& player) {
+  player.Press();
+  player.Run(0.1);
+  std::set<std::uint64_t> past;
+  const std::size_t from = player.seen().size();
+  for (int i = 0; i < 3; ++i) {
+    const WorldFrame frame = player.NextFrame();
+    past.insert(frame.frame);
+    player.judge().FramePublished(player.segment().epoch(), frame.frame, 0,
+                                  std::span(frame.planes).first(frame.plane_count));
+    Words words(kWorldFrameBytes / 8);
+    const Encoded shape = Encode(frame, words);
+    player.writer().Publish(std::span<const std::uint64_t>(words).first(shape.used_bytes / 8),
+                            shape, static_cast<std::uint64_t>(MonotonicNow() - 1'000'000'000));
+    player.Run(0.01);
+  }
+  const std::uint64_t good = player.frame();
+  Require(player.Until([&] { return player.newest().world_frame > good; }, 1),
+          "good frames after three with stamps of the past are not displayed");
+  for (std::size_t i = from; i < player.seen().size(); ++i) {
+    if (past.count(player.seen()[i].world_frame) != 0) {
+      NotStrict("frame " + std::to_string(player.seen()[i].world_frame) +
+                " is displayed, whose stamp is a second before that of the frame before");
+    }
+  }
 }
 
 // A world of the past: the numbers of the frames, not of the messages, go back.
@@ -287,78 +297,6 @@ void Flood(WorldPlayer& player) {
   if (!displayed) Inform("a world of 20 kHz is not displayed");
 }
 
-void NeverNamed(WorldPlayer& player, const std::function<void(SegmentHeader&)>& alter,
-                SegmentState state, const std::string& what, double seconds = 0.3) {
-  player.Open(alter, state);
-  const std::uint64_t epoch = player.segment().epoch();
-  const std::size_t from = player.seen().size();
-  player.Run(seconds);
-  for (std::size_t i = from; i < player.seen().size(); ++i) {
-    Require(player.seen()[i].world_epoch != epoch, "frames are displayed though " + what);
-    Require(Norm(player.seen()[i].force) < kZeroForce, "force though " + what);
-  }
-}
-
-void Major(WorldPlayer& player) {
-  player.Leave();
-  NeverNamed(
-      player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
-      "version_major differs");
-  player.Leave();
-}
-void Minor(WorldPlayer& player) {
-  if (kVersionMajor != 0) Unimplemented("from 1.0 on minor versions may differ");
-  player.Leave();
-  NeverNamed(
-      player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
-      "version_minor differs under major 0");
-  player.Leave();
-}
-void Hash(WorldPlayer& player) {
-  player.Leave();
-  NeverNamed(
-      player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
-      "layout_hash differs under the same version");
-  player.Leave();
-}
-void Initialising(WorldPlayer& player) {
-  player.Leave();
-  NeverNamed(player, {}, SegmentState::kInitialising, "state is initialising");
-  player.segment().SetState(SegmentState::kReady);
-  player.Couple();
-}
-
-void WrongHeaders(WorldPlayer& player) {
-  struct Wrong {
-    const char* what;
-    void (*alter)(SegmentHeader&);
-  };
-  constexpr Wrong kWrong[] = {
-      {"magic is wrong", [](SegmentHeader& h) { h.magic ^= 1; }},
-      {"byte_order is wrong", [](SegmentHeader& h) { h.byte_order = 0x04030201; }},
-      {"header_bytes is wrong", [](SegmentHeader& h) { h.header_bytes = 8192; }},
-      {"role is haptic", [](SegmentHeader& h) { h.role = 1; }},
-      {"epoch is 0", [](SegmentHeader& h) { h.epoch = 0; }},
-      {"there are 17 streams", [](SegmentHeader& h) { h.stream_count = 17; }},
-      {"segment_bytes is more than there is", [](SegmentHeader& h) { h.segment_bytes <<= 8; }},
-      {"the ring ends outside", [](SegmentHeader& h) { h.stream[0].slot_count = 65536; }},
-      {"slot_count is no power of two", [](SegmentHeader& h) { h.stream[0].slot_count = 7; }},
-      {"slot_stride is 0", [](SegmentHeader& h) { h.stream[0].slot_stride = 0; }},
-      {"the counter lies in the ring",
-       [](SegmentHeader& h) { h.stream[0].cursor_offset = h.stream[0].ring_offset; }},
-      {"the counter is not aligned", [](SegmentHeader& h) { h.stream[0].cursor_offset += 8; }},
-      {"the ring lies at the end of the address space",
-       [](SegmentHeader& h) { h.stream[0].ring_offset = ~std::uint64_t{127}; }},
-      {"there is no world.frame", [](SegmentHeader& h) { h.stream[0].type_id = 999; }},
-  };
-  player.Leave();
-  for (const Wrong& wrong : kWrong) {
-    NeverNamed(player, wrong.alter, SegmentState::kReady, wrong.what, 0.2);
-  }
-  player.Leave();
-  player.Couple();
-}
-
 constexpr HapticCase kCases[] = {
     {"haptic/9.2-3/not-a-number", NotANumber},
     {"haptic/9.2-3/infinite", Infinite},
@@ -373,16 +311,19 @@ constexpr HapticCase kCases[] = {
     {"haptic/9.2-2/odd-length", OddLength},
     {"haptic/9.2-6/ten-in-a-row", TenInARow},
     {"haptic/9.2-6/backwards", Backwards},
+    {"haptic/9.2-8/future-stamp", FromTheFuture},
+    {"haptic/9.2-9/jump", Jumps},
+    {"haptic/9.2-10/past-stamp", FromThePast},
     {"haptic/6.2-3/stale", Stale},
     {"haptic/4.3-1/first-look", FirstLook},
     {"haptic/4.3-1/second-look", SecondLook},
     {"haptic/8.2-7/unknown-blocks", UnknownBlocks},
     {"haptic/6.1-1/flood", Flood},
-    {"haptic/8.2-1/major", Major},
-    {"haptic/8.2-2/minor", Minor},
-    {"haptic/8.2-3/hash", Hash},
-    {"haptic/5.2-9/initialising", Initialising},
-    {"haptic/9.1-1/wrong-headers", WrongHeaders},
+    {"haptic/8.2-1/major", RefusesMajor},
+    {"haptic/8.2-2/minor", RefusesMinor},
+    {"haptic/8.2-3/hash", RefusesHash},
+    {"haptic/5.2-9/initialising", WaitsForReady},
+    {"haptic/9.1-1/wrong-headers", RefusesWrongHeaders},
 };
 
 }  // namespace

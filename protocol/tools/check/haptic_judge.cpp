@@ -145,7 +145,9 @@ void HapticJudge::Forces(const HapticTick& tick, bool consecutive) {
       return Num(Norm(TotalForce(tick))) + " N displayed without a world" + At(tick);
     });
   }
-  if (consecutive && slew_limit_ > 0) {
+  const bool stopped =
+      tick.pointer_count > 0 && tick.pointers[0].reason == ForceReason::kEmergencyStop;
+  if (consecutive && slew_limit_ > 0 && !stopped) {
     const double step = Norm(Difference(TotalForce(tick), TotalForce(newest_)));
     const double most = slew_limit_ * Seconds(tick.period_ns) * (1 + 1e-9) + kNoForce;
     monitor_.Judge(kSlew, step <= most, [&] {
@@ -298,6 +300,7 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
   if (tick.world_epoch != shown_epoch_ || shown == shown_.end()) return;
   const std::vector<Plane>& planes = shown->second.planes;
   if (planes.size() != 1 || shown->second.unchanged < 2 || tick.pointer_count == 0) return;
+  if (planes[0].inverse_mass == 0) return;  // ground's
   if (Norm(TotalForce(tick)) < 0.01) return;
   const auto fits = [&](const Channel& channel) {
     return channel.body == planes[0].body && channel.generation == planes[0].generation &&

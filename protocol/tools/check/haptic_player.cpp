@@ -1,10 +1,8 @@
 #include "protocol/tools/check/haptic_player.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
-#include <thread>
 
 #include "common/clock.h"
 
@@ -14,18 +12,6 @@ namespace {
 constexpr double kDepth = 0.0005;       // m, of the finger in the box
 constexpr double kFarthest = 0.15;      // m from the target, where the approach begins
 constexpr double kApproachSpeed = 0.1;  // m/s
-
-std::unique_ptr<PeerView> WaitForPeer(const std::string& instance, double patience_s) {
-  const AttachRequest request{
-      .instance = instance, .role = Role::kWorld, .required = {}, .owners = {}};
-  const std::int64_t limit = MonotonicNow() + static_cast<std::int64_t>(patience_s * 1e9);
-  for (;;) {
-    AttachResult result = Attach(request);
-    if (result.status == AttachStatus::kAttached) return std::move(result.view);
-    if (MonotonicNow() > limit) throw SegmentError(1, "no world to judge: " + result.text);
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-}
 
 double RawDouble(std::span<const std::uint64_t> words, std::size_t offset) {
   double value = 0;
@@ -39,7 +25,7 @@ HapticPlayer::HapticPlayer(const PlayOptions& options, double patience_s)
     : options_(options),
       target_{options.target[0], options.target[1], options.target[2]},
       role_(options.instance, Role::kHaptic, options.runtime_directory),
-      peer_(WaitForPeer(options.instance, patience_s)),
+      peer_(WaitForPeer(options.instance, Role::kWorld, patience_s)),
       frames_(peer_->Stream(StreamType::kWorldFrame)),
       words_(kWorldFrameBytes / 8 + 512),
       healths_(peer_->Reader<WorldHealth>()),
@@ -93,6 +79,19 @@ void HapticPlayer::Open(const std::function<void(SegmentHeader&)>& alter, Segmen
   each_tick = {};
   named_epoch = 0;
   channels.clear();
+}
+
+void HapticPlayer::NeverTaken(const std::function<void(SegmentHeader&)>& alter, SegmentState state,
+                              const std::string& what) {
+  Open(alter, state);
+  const std::size_t from = seen_.size();
+  // Time to be found, and for a frame that would say so.
+  Run(0.15 + Frames(1.5));
+  Require(seen_.size() > from, "no frames while " + what);
+  for (std::size_t i = from; i < seen_.size(); ++i) {
+    Require(seen_[i].frame.acked_epoch != segment_->epoch(),
+            "our ticks are acknowledged though " + what);
+  }
 }
 
 Channel& HapticPlayer::OpenChannel(std::uint32_t body, std::uint32_t generation) {
@@ -163,15 +162,16 @@ void HapticPlayer::Publish(const HapticTick& tick) {
 }
 
 void HapticPlayer::PublishSpoilt(
-    const HapticTick& tick,
-    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil) {
+    const HapticTick& tick, const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+    std::int64_t stamp_offset_ns) {
   published_[segment_->epoch()].spoilt[tick.tick] = true;
-  PublishAs(tick, spoil);
+  PublishAs(tick, spoil, stamp_offset_ns);
 }
 
 void HapticPlayer::PublishAs(
     const HapticTick& tick,
-    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change) {
+    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change,
+    std::int64_t stamp_offset_ns) {
   Remember(tick);
   std::vector<std::uint64_t> words(kHapticTickBytes / 8);
   Encoded encoded = Encode(tick, words);
@@ -179,7 +179,12 @@ void HapticPlayer::PublishAs(
   const std::size_t stored =
       std::min<std::size_t>(encoded.used_bytes, writer_.ring().payload_bytes) / 8;
   writer_.Publish(std::span<const std::uint64_t>(words).first(stored), encoded,
-                  static_cast<std::uint64_t>(MonotonicNow()));
+                  static_cast<std::uint64_t>(MonotonicNow() + stamp_offset_ns));
+}
+
+void HapticPlayer::Jump(std::uint64_t numbers) {
+  next_tick_ += numbers;
+  writer_.SetPublished(writer_.published() + numbers);
 }
 
 void HapticPlayer::Drain() {
@@ -278,16 +283,8 @@ void HapticPlayer::JudgeFrame(std::span<const std::uint64_t> words, const Receiv
 }
 
 void HapticPlayer::Step() {
-  const std::int64_t now = MonotonicNow();
-  if (last_step_ns_ != 0) longest_pause_ns_ = std::max(longest_pause_ns_, now - last_step_ns_);
-  last_step_ns_ = now;
+  const std::int64_t now = pace_.Step(*peer_, Role::kWorld);
   Drain();
-  if (now - last_alive_ns_ > 100'000'000) {
-    last_alive_ns_ = now;
-    if (!peer_->OwnerAlive() || peer_->State() == SegmentState::kClosed) {
-      throw SegmentError(1, "the world ended while it was judged");
-    }
-  }
   if (open() && publishing && now >= next_ns_) {
     next_ns_ = std::max(next_ns_ + period_ns, now + period_ns / 2);
     HapticTick tick = NextTick();
@@ -302,13 +299,7 @@ void HapticPlayer::Run(double seconds) {
 }
 
 bool HapticPlayer::Until(const std::function<bool()>& done, double seconds) {
-  const std::int64_t limit = MonotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
-  last_step_ns_ = 0;
-  while (!done()) {
-    if (MonotonicNow() > limit) return false;
-    Step();
-  }
-  return true;
+  return pace_.Until([this] { Step(); }, done, seconds);
 }
 
 void HapticPlayer::Couple() {

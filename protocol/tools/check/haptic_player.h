@@ -15,6 +15,7 @@
 #include "protocol/messages.h"
 #include "protocol/tools/check/case.h"
 #include "protocol/tools/check/monitor.h"
+#include "protocol/tools/check/pace.h"
 #include "protocol/tools/check/played_segment.h"
 #include "protocol/tools/check/totals.h"
 
@@ -56,6 +57,10 @@ class HapticPlayer {
   const std::vector<SeenFrame>& seen() const { return seen_; }
   const WorldFrame& newest() const { return newest_; }
   std::int64_t WorldPeriodNs() const;
+  /// So many frames last, s.
+  double Frames(double frames) const {
+    return frames * 1e-9 * static_cast<double>(WorldPeriodNs());
+  }
   std::optional<WorldHealth> Health();
   /// The body of that number in the newest world.bodies.
   std::optional<Body> BodyOf(std::uint32_t body);
@@ -66,6 +71,12 @@ class HapticPlayer {
   bool open() const { return segment_ != nullptr && !segment_->ended(); }
   PlayedSegment& segment() { return *segment_; }
   void Close() { segment_->Close(); }
+  void Leave() {
+    if (open()) Close();
+  }
+  /// A segment that must be left alone; fails if it is taken.
+  void NeverTaken(const std::function<void(SegmentHeader&)>& alter, SegmentState state,
+                  const std::string& what);
   void Die() { segment_->Die(); }
 
   // ---- Time.
@@ -89,12 +100,17 @@ class HapticPlayer {
   std::uint64_t named_epoch = 0;  // 0 = the world's
   HapticTick NextTick();
   void Publish(const HapticTick& tick);
-  /// A sound message, but `change` has the last word on its bytes.
+  /// A sound message, but `change` has the last word on its bytes. The stamp is `stamp_offset_ns`
+  /// later than now.
   void PublishAs(const HapticTick& tick,
-                 const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change);
+                 const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& change,
+                 std::int64_t stamp_offset_ns = 0);
   /// The number counts as used; the world must never acknowledge it.
   void PublishSpoilt(const HapticTick& tick,
-                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil);
+                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+                     std::int64_t stamp_offset_ns = 0);
+  /// The numbers of messages and ticks grow by `numbers` at once.
+  void Jump(std::uint64_t numbers);
   /// Ticks up to `last` count as performed, with the totals of the newest.
   void PerformedAlike(std::uint64_t last) { published_[segment_->epoch()].alike_until = last; }
   std::uint64_t tick() const { return next_tick_ - 1; }
@@ -111,8 +127,8 @@ class HapticPlayer {
   bool Movable();
   const Plane& touched() const { return touched_; }
 
-  std::int64_t longest_pause_ns() const { return longest_pause_ns_; }
-  void Calm() { longest_pause_ns_ = 0; }
+  std::int64_t longest_pause_ns() const { return pace_.longest_pause_ns(); }
+  void Calm() { pace_.Calm(); }
 
  private:
   void Drain();
@@ -141,9 +157,7 @@ class HapticPlayer {
   std::uint64_t next_tick_ = 0;
   std::int64_t previous_start_ns_ = 0;
   std::int64_t next_ns_ = 0;
-  std::int64_t last_step_ns_ = 0;
-  std::int64_t last_alive_ns_ = 0;
-  std::int64_t longest_pause_ns_ = 0;
+  Pace pace_;
   Plane touched_;
 
   /// What every epoch of ours published: the sum over channels by tick.

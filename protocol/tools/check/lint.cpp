@@ -175,15 +175,71 @@ void CheckPublication(const RawView& view, StreamType main, double seconds) {
   Require(wrong == 0, "a slot holds a number that does not belong there");
 }
 
+namespace {
+
+/// What a frame says of what can move, in a line; fails where it contradicts itself.
+std::string TellMobility(const WorldFrame& frame) {
+  std::uint32_t fixed = 0;
+  std::uint32_t not_said = 0;
+  double least = 0;
+  double most = 0;
+  for (std::uint32_t i = 0; i < frame.plane_count; ++i) {
+    const Plane& plane = frame.planes[i];
+    const double yields = plane.inverse_mass;
+    fixed += yields == 0;
+    not_said += yields == kMobilityNotSaid;
+    if (yields > 0) least = least == 0 ? yields : std::min(least, yields);
+    most = std::max(most, yields);
+    for (std::uint32_t j = 0; j < frame.local_body_count; ++j) {
+      Require(
+          yields != 0 || plane.body != frame.local_bodies[j].body,
+          "body " + std::to_string(plane.body) + " is local, and its plane says that it is fixed");
+    }
+  }
+  std::string text = "frame " + std::to_string(frame.frame) + ": " +
+                     std::to_string(frame.plane_count) + " planes, " + std::to_string(fixed) +
+                     " of bodies that cannot move, " + std::to_string(not_said) +
+                     " that do not say";
+  if (most > 0) text += ", the others yield by " + Num(least) + " to " + Num(most) + " 1/kg";
+  return text;
+}
+
+std::string TellLocalBodies(const WorldFrame& frame) {
+  std::string text = "frame " + std::to_string(frame.frame) + ": " +
+                     std::to_string(frame.local_body_count) + " local bodies";
+  if (frame.local_body_count > 0) {
+    text += ", substep " + Ms(static_cast<std::int64_t>(frame.local_substep_ns));
+  }
+  for (std::uint32_t i = 0; i < frame.local_body_count; ++i) {
+    const LocalBody& body = frame.local_bodies[i];
+    text += "; body " + std::to_string(body.body) + " (generation " +
+            std::to_string(body.generation) + ") " + Num(body.mass) + " kg, " +
+            std::to_string(body.contact_count) + " contact planes";
+    for (std::uint32_t c = 0; c < body.contact_count; ++c) {
+      const ContactPlane& contact = body.contacts[c];
+      text += (c == 0 ? " (body " : ", body ") + std::to_string(contact.other_body) + " gap " +
+              Num(contact.gap) + " m";
+      if (contact.radius > 0) text += " radius " + Num(contact.radius) + " m";
+    }
+    if (body.contact_count > 0) text += ")";
+  }
+  return text;
+}
+
+}  // namespace
+
 std::vector<Result> Inspect(const std::string& instance, Role role) {
   const std::string who = RoleName(role);
   const StreamType main = role == Role::kHaptic ? StreamType::kHapticTick : StreamType::kWorldFrame;
   std::vector<Result> results;
+  std::string told;  // what a check says of a sound segment
   const auto add = [&](const std::string& id, const std::function<void()>& check) {
+    told.clear();
     const std::int64_t start = MonotonicNow();
     Result result{who + "/" + id, {}, 0};
     try {
       check();
+      result.outcome.text = told;
     } catch (const Outcome& outcome) {
       result.outcome = outcome;
     } catch (const std::exception& error) {
@@ -228,7 +284,13 @@ std::vector<Result> Inspect(const std::string& instance, Role role) {
       Require(bodies.ReadLatest() != ReadStatus::kRejected, "world.bodies is not sound");
     }
     Require(seen > 0, "no message");
+    told = std::to_string(seen) + " messages read";
   });
+  if (role != Role::kWorld) return results;
+  WorldFrame newest;
+  attached.view->Reader<WorldFrame>().ReadLatest(newest);
+  add("6.2-13/mobility", [&] { told = TellMobility(newest); });
+  add("7.7-6/local-bodies", [&] { told = TellLocalBodies(newest); });
   return results;
 }
 

@@ -65,7 +65,7 @@ PlayedSegment::PlayedSegment(const SegmentScript& script)
   for (const StreamSpec& spec : script.streams) {
     StreamEntry entry{};
     entry.type_id = static_cast<std::uint32_t>(spec.type);
-    entry.type_version = 1;
+    entry.type_version = TypeVersion(spec.type);
     entry.cursor_offset = cursor;
     entry.ring_offset = ring;
     entry.slot_stride =

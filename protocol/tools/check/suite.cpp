@@ -31,8 +31,8 @@ std::unique_ptr<Player> Meet(const PlayOptions& options, Role role, const char* 
 
 std::vector<HapticCase> AllHapticCases() {
   std::vector<HapticCase> all;
-  for (const auto& group : {HapticSegmentCases(), HapticContactCases(), HapticNonsenseCases(),
-                            HapticEndCases(), HapticMonitorCases()}) {
+  for (const auto& group : {HapticSegmentCases(), HapticContactCases(), HapticLocalCases(),
+                            HapticNonsenseCases(), HapticEndCases(), HapticMonitorCases()}) {
     all.insert(all.end(), group.begin(), group.end());
   }
   return all;
@@ -40,8 +40,8 @@ std::vector<HapticCase> AllHapticCases() {
 
 std::vector<WorldCase> AllWorldCases() {
   std::vector<WorldCase> all;
-  for (const auto& group : {WorldSegmentCases(), WorldContactCases(), WorldNonsenseCases(),
-                            WorldEndCases(), WorldMonitorCases()}) {
+  for (const auto& group : {WorldSegmentCases(), WorldContactCases(), WorldLocalCases(),
+                            WorldNonsenseCases(), WorldEndCases(), WorldMonitorCases()}) {
     all.insert(all.end(), group.begin(), group.end());
   }
   return all;

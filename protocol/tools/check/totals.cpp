@@ -29,6 +29,10 @@ ImpulseUnits Minus(const ImpulseUnits& a, const ImpulseUnits& b) {
   return difference;
 }
 
+std::int64_t Units(double newton_seconds) {
+  return static_cast<std::int64_t>(std::llround(newton_seconds / kImpulseUnit));
+}
+
 double Largest(const ImpulseUnits& units) {
   double largest = 0;
   for (const std::int64_t unit : units) {

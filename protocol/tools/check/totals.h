@@ -12,6 +12,8 @@ namespace rikiseki::protocol::check {
 
 ImpulseUnits Plus(const ImpulseUnits& a, const ImpulseUnits& b);
 ImpulseUnits Minus(const ImpulseUnits& a, const ImpulseUnits& b);
+/// An impulse [N s] in whole units.
+std::int64_t Units(double newton_seconds);
 /// Largest magnitude of an axis, in units.
 double Largest(const ImpulseUnits& units);
 std::string Text(const ImpulseUnits& units);

@@ -14,10 +14,6 @@ namespace {
 // No world lets one tick apply more than this force for its gap.
 constexpr double kLargestCap = 1000;  // N
 
-std::int64_t Units(double newton_seconds) {
-  return static_cast<std::int64_t>(std::llround(newton_seconds / kImpulseUnit));
-}
-
 RawView Raw(HapticPlayer& player) {
   return RawView(player.instance(), Role::kWorld);
 }
@@ -90,7 +86,7 @@ void Planes(HapticPlayer& player) {
   const Plane& plane = player.touched();
   const Vector outside = Sum(plane.point, Scaled(plane.normal, 0.005 + player.radius));
   player.position = outside;
-  player.Run(3e-9 * static_cast<double>(player.WorldPeriodNs()) + 0.05);
+  player.Run(player.Frames(3) + 0.05);
   bool seen = false;
   for (std::uint32_t i = 0; i < player.newest().plane_count; ++i) {
     const Plane& now = player.newest().planes[i];
@@ -118,7 +114,7 @@ void Box(HapticPlayer& player) {
 void FarAway(HapticPlayer& player) {
   player.Touch();
   player.position = Sum(player.target(), {-100, 0, 0});
-  player.Run(3e-9 * static_cast<double>(player.WorldPeriodNs()) + 0.05);
+  player.Run(player.Frames(3) + 0.05);
   std::uint32_t near_box = 0;
   for (std::uint32_t i = 0; i < player.newest().plane_count; ++i) {
     if (player.newest().planes[i].body == player.touched().body) ++near_box;
@@ -243,7 +239,7 @@ ImpulseUnits AppliedBy(HapticPlayer& player, const std::function<void()>& act) {
 void Gap(HapticPlayer& player) {
   player.Touch();
   const std::uint64_t breaches = player.monitor().breaches(kSum);
-  const double gap = std::max(0.1, 3e-9 * static_cast<double>(player.WorldPeriodNs()));
+  const double gap = std::max(0.1, player.Frames(3));
   const ImpulseUnits applied = AppliedBy(player, [&] {
     player.publishing = false;
     player.Run(0.3);

@@ -12,6 +12,7 @@ using WorldCase = Case<HapticPlayer>;
 
 std::span<const WorldCase> WorldSegmentCases();   // header, liveness, ring
 std::span<const WorldCase> WorldContactCases();   // planes, acks, what is applied
+std::span<const WorldCase> WorldLocalCases();     // what can move, and by whom
 std::span<const WorldCase> WorldNonsenseCases();  // what is refused
 std::span<const WorldCase> WorldEndCases();       // silent, dead, restarted haptic sides
 std::span<const WorldCase> WorldMonitorCases();   // judged on every frame of the run

@@ -1,23 +1,22 @@
-// A world under test, with a haptic side that talks nonsense, falls silent, dies or starts again.
+// A world under test, with a haptic side that talks nonsense: what it must refuse, and that it goes on.
 #include <atomic>
 #include <cmath>
 #include <limits>
 
 #include "common/clock.h"
+#include "protocol/tools/check/header_cases.h"
 #include "protocol/tools/check/world_cases.h"
 
 namespace rikiseki::protocol::check {
 namespace {
 
 constexpr std::int64_t kWholeNs = 400;  // how long a message stays whole: as long as a copy takes
+constexpr std::int64_t kFarFutureNs = 10'000'000'000;
+constexpr std::uint64_t kLeap = 10'000'000;  // messages: hours of ticks
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 using Words = std::vector<std::uint64_t>;
 using Spoil = std::function<void(Words&, Encoded&)>;
-
-std::int64_t Units(double newton_seconds) {
-  return static_cast<std::int64_t>(std::llround(newton_seconds / kImpulseUnit));
-}
 
 std::size_t Head(const char* field) {
   return FieldOffset("haptic.tick", field);
@@ -30,12 +29,8 @@ std::size_t OfChannel(const char* field) {
          FieldOffset("haptic.tick/channel", field);
 }
 
-double Frames(const HapticPlayer& player, double frames) {
-  return frames * 1e-9 * static_cast<double>(player.WorldPeriodNs());
-}
-
 /// Spoilt ticks among good ones: none is acknowledged, what they brought comes with the next.
-void Refuses(HapticPlayer& player, const Spoil& spoil) {
+void Refuses(HapticPlayer& player, const Spoil& spoil, std::int64_t stamp_offset_ns = 0) {
   player.Touch();
   const std::uint64_t sums = player.monitor().breaches(kSum);
   const std::uint64_t accepted = player.monitor().breaches(kRefused);
@@ -45,7 +40,7 @@ void Refuses(HapticPlayer& player, const Spoil& spoil) {
   for (int i = 0; i < 6; ++i) {
     player.Push({Units(i % 2 == 0 ? 0.001 : -0.001), 0, 0});
     player.publishing = false;
-    player.PublishSpoilt(player.NextTick(), spoil);
+    player.PublishSpoilt(player.NextTick(), spoil, stamp_offset_ns);
     player.Until([&] { return player.newest().frame > frame + static_cast<std::uint64_t>(i); }, 1);
     player.publishing = true;
     player.Run(0.005);
@@ -95,7 +90,7 @@ void TooLong(HapticPlayer& player) {
 void FarFinger(HapticPlayer& player) {
   player.Touch();
   player.position = {1e300, -1e300, 1e300};
-  player.Run(Frames(player, 4));
+  player.Run(player.Frames(4));
   player.position = player.target();
   const std::uint64_t frame = player.newest().frame;
   Require(player.Until([&] { return player.newest().frame > frame + 2; }, 2), "frames end");
@@ -104,7 +99,7 @@ void FarFinger(HapticPlayer& player) {
 
 void Detached(HapticPlayer& player, const char* what) {
   const std::uint64_t last = player.tick();
-  player.Run(Frames(player, 6) + 0.2);
+  player.Run(player.Frames(6) + 0.2);
   const bool left =
       player.newest().acked_epoch != player.segment().epoch() || player.newest().acked_tick <= last;
   player.Close();
@@ -121,7 +116,7 @@ void TenInARow(HapticPlayer& player) {
     player.PublishSpoilt(player.NextTick(),
                          [](Words& words, Encoded&) { Poke(words, OfPointer("position"), kNaN); });
   }
-  player.Run(Frames(player, 3));
+  player.Run(player.Frames(3));
   player.publishing = true;
   Detached(player, "ten messages in a row were nonsense");
 }
@@ -130,13 +125,54 @@ void Backwards(HapticPlayer& player) {
   player.Touch();
   Require(player.Settle(), "ticks are not acknowledged");
   player.publishing = false;
-  player.Run(Frames(player, 2));
+  player.Run(player.Frames(2));
   const std::uint64_t number = player.writer().published();
   player.writer().SetPublished(number - 5);
-  player.Run(Frames(player, 3));
+  player.Run(player.Frames(3));
   player.writer().SetPublished(number);
   player.publishing = true;
   Detached(player, "the counter ran backwards");
+}
+
+// Of eight slots, so that the leap fills them all at once, and a lapped reader finds the message that it
+// goes on with.
+void Jumps(HapticPlayer& player) {
+  constexpr std::uint32_t kSlots = 8;
+  player.Touch();
+  const Plane box = player.touched();
+  player.Close();
+  player.Open({}, SegmentState::kReady, kSlots);
+  player.OpenChannel(box.body, box.generation);
+  player.Couple();
+  player.Run(player.Frames(2));
+  player.Jump(kLeap);
+  for (std::uint32_t i = 0; i < kSlots; ++i) player.Publish(player.NextTick());
+  AsShould([&] { Detached(player, "published grew by ten million messages at once"); });
+}
+
+void FromTheFuture(HapticPlayer& player) {
+  Refuses(
+      player, [](Words&, Encoded&) {}, kFarFutureNs);
+}
+
+// Older than the message before, each as the newest of what one frame takes; no MUST.
+void FromThePast(HapticPlayer& player) {
+  player.Touch();
+  Require(player.Settle(), "ticks are not acknowledged");
+  bool taken = false;
+  for (int i = 0; i < 4; ++i) {
+    player.publishing = false;
+    const HapticTick tick = player.NextTick();
+    player.PublishAs(
+        tick, [](Words&, Encoded&) {}, -1'000'000'000);
+    const std::uint64_t frame = player.newest().frame;
+    player.Until([&] { return player.newest().frame > frame + 1; }, 1);
+    taken = taken || player.newest().acked_tick == tick.tick;
+    player.publishing = true;
+    player.Run(0.005);
+  }
+  Require(player.Settle(), "good ticks after four with stamps of the past are not acknowledged");
+  if (taken) NotStrict("a tick is taken whose stamp is a second before that of the tick before");
 }
 
 void FirstLook(HapticPlayer& player) {
@@ -154,7 +190,7 @@ void FirstLook(HapticPlayer& player) {
     const std::uint64_t number = player.writer().published();
     player.writer().PublishPartly(words, shape, 2);
     player.writer().SetPublished(number + 1);
-    player.Run(Frames(player, 2));
+    player.Run(player.Frames(2));
     // Whole at last, and true.
     player.writer().SetPublished(number);
     player.Publish(tick);
@@ -265,161 +301,7 @@ void Flood(HapticPlayer& player) {
   if (!settled) Inform("a haptic side of 20 kHz is not acknowledged to its end");
 }
 
-void NeverAcked(HapticPlayer& player, const std::function<void(SegmentHeader&)>& alter,
-                SegmentState state, const std::string& what) {
-  player.Open(alter, state);
-  const std::uint64_t epoch = player.segment().epoch();
-  const std::size_t from = player.seen().size();
-  player.Run(0.15 + Frames(player, 1.5));
-  Require(player.seen().size() > from, "no frames while " + what);
-  for (std::size_t i = from; i < player.seen().size(); ++i) {
-    Require(player.seen()[i].frame.acked_epoch != epoch,
-            "our ticks are acknowledged though " + what);
-  }
-}
-
-void Major(HapticPlayer& player) {
-  NeverAcked(
-      player, [](SegmentHeader& header) { ++header.version_major; }, SegmentState::kReady,
-      "version_major differs");
-  player.Close();
-}
-void Minor(HapticPlayer& player) {
-  if (kVersionMajor != 0) Unimplemented("from 1.0 on minor versions may differ");
-  NeverAcked(
-      player, [](SegmentHeader& header) { ++header.version_minor; }, SegmentState::kReady,
-      "version_minor differs under major 0");
-  player.Close();
-}
-void Hash(HapticPlayer& player) {
-  NeverAcked(
-      player, [](SegmentHeader& header) { header.layout_hash ^= 1; }, SegmentState::kReady,
-      "layout_hash differs under the same version");
-  player.Close();
-}
-void Initialising(HapticPlayer& player) {
-  NeverAcked(player, {}, SegmentState::kInitialising, "state is initialising");
-  player.segment().SetState(SegmentState::kReady);
-  player.Couple();
-}
-
-void WrongHeaders(HapticPlayer& player) {
-  struct Wrong {
-    const char* what;
-    void (*alter)(SegmentHeader&);
-  };
-  constexpr Wrong kWrong[] = {
-      {"magic is wrong", [](SegmentHeader& h) { h.magic ^= 1; }},
-      {"byte_order is wrong", [](SegmentHeader& h) { h.byte_order = 0x04030201; }},
-      {"header_bytes is wrong", [](SegmentHeader& h) { h.header_bytes = 8192; }},
-      {"role is world", [](SegmentHeader& h) { h.role = 2; }},
-      {"there are 17 streams", [](SegmentHeader& h) { h.stream_count = 17; }},
-      {"segment_bytes is more than there is", [](SegmentHeader& h) { h.segment_bytes <<= 8; }},
-      {"the ring ends outside", [](SegmentHeader& h) { h.stream[0].slot_count = 65536; }},
-      {"slot_count is no power of two", [](SegmentHeader& h) { h.stream[0].slot_count = 7; }},
-      {"slot_stride is 0", [](SegmentHeader& h) { h.stream[0].slot_stride = 0; }},
-      {"the counter lies in the ring",
-       [](SegmentHeader& h) { h.stream[0].cursor_offset = h.stream[0].ring_offset; }},
-      {"the ring lies at the end of the address space",
-       [](SegmentHeader& h) { h.stream[0].ring_offset = ~std::uint64_t{127}; }},
-      {"there is no haptic.tick", [](SegmentHeader& h) { h.stream[0].type_id = 999; }},
-  };
-  for (const Wrong& wrong : kWrong)
-    NeverAcked(player, wrong.alter, SegmentState::kReady, wrong.what);
-  player.Close();
-  player.Open();
-  player.Couple();
-}
-
-// ---- Ends.
-
-void Silent(HapticPlayer& player) {
-  player.Touch();
-  player.each_tick = {Units(0.0005), 0, 0};
-  player.Run(0.05);
-  player.each_tick = {Units(-0.0005), 0, 0};
-  player.Run(0.05);
-  player.publishing = false;
-  Require(player.Settle(1), "the last ticks are not acknowledged");
-  const WorldFrame before = player.newest();
-  player.Run(Frames(player, 5) + 0.1);
-  const WorldFrame after = player.newest();
-  Require(after.frame > before.frame + 2, "frames end when the haptic side falls silent");
-  Require(after.applied == before.applied && after.discarded == before.discarded,
-          "impulses are applied while the haptic side is silent");
-  const auto health = player.Health();
-  player.publishing = true;
-  player.each_tick = {};
-  Require(player.Settle(), "the same haptic side goes on, and is not acknowledged");
-  if (health && health->peer_state == PeerState::kLive) {
-    NotStrict("world.health says live of a haptic side that is silent");
-  }
-}
-
-/// Ends at once after a push, and starts again; the old epoch's last tick must be in a frame.
-void LastWords(HapticPlayer& player, bool cleanly, const char* what) {
-  player.Touch();
-  const Plane box = player.touched();
-  Require(player.Settle(), "ticks are not acknowledged");
-  player.publishing = false;
-  const std::uint64_t sums = player.monitor().breaches(kSum);
-  for (int i = 0; i < 10; ++i) {
-    player.Push({Units(i % 2 == 0 ? 0.002 : -0.001), 0, 0});
-    player.Publish(player.NextTick());
-  }
-  const std::uint64_t old_epoch = player.segment().epoch();
-  const std::uint64_t last = player.tick();
-  const std::size_t from = player.seen().size();
-  if (cleanly)
-    player.Close();
-  else
-    player.Die();
-  player.Open();
-  player.OpenChannel(box.body, box.generation);
-  player.Couple();
-  bool heard = false;
-  for (std::size_t i = from; i < player.seen().size(); ++i) {
-    const WorldFrame& frame = player.seen()[i].frame;
-    heard = heard || (frame.acked_epoch == old_epoch && frame.acked_tick == last);
-  }
-  Require(heard, std::string(what) + ": its last tick " + std::to_string(last) +
-                     " was never acknowledged");
-  player.Run(0.02);
-  Require(player.Settle(), "the new epoch is not acknowledged");
-  if (player.monitor().breaches(kSum) > sums) player.monitor().Report(kSum);
-}
-
-void Restarts(HapticPlayer& player) {
-  // At whatever moment between two frames it happens.
-  for (int i = 0; i < 3; ++i) {
-    LastWords(player, false, "the haptic side died and started again");
-    player.Run(0.007 * i);
-  }
-}
-void Closes(HapticPlayer& player) {
-  LastWords(player, true, "the haptic side closed and started again");
-}
-
-void MidWrite(HapticPlayer& player) {
-  player.Touch();
-  Require(player.Settle(), "ticks are not acknowledged");
-  player.publishing = false;
-  HapticTick tick = player.NextTick();
-  Words words(kHapticTickBytes / 8);
-  const Encoded shape = Encode(tick, words);
-  words.resize(shape.used_bytes / 8);
-  const std::uint64_t acks = player.monitor().breaches(kAckForward);
-  player.writer().PublishPartly(words, shape, 3);
-  player.Die();
-  const std::uint64_t frame = player.newest().frame;
-  Require(player.Until([&] { return player.newest().frame > frame + 4; }, 3),
-          "frames end when a haptic side dies while it writes");
-  Require(player.monitor().breaches(kAckForward) == acks, "the unfinished tick is acknowledged");
-  player.Open();
-  player.Couple();
-}
-
-constexpr WorldCase kNonsense[] = {
+constexpr WorldCase kCases[] = {
     {"world/9.2-3/not-a-number", NotANumber},
     {"world/9.2-3/not-a-number-moment", NotANumberMoment},
     {"world/9.2-2/absurd-count", AbsurdCount},
@@ -432,31 +314,24 @@ constexpr WorldCase kNonsense[] = {
     {"world/9.2-7/far-finger", FarFinger},
     {"world/9.2-6/ten-in-a-row", TenInARow},
     {"world/9.2-6/backwards", Backwards},
+    {"world/9.2-8/future-stamp", FromTheFuture},
+    {"world/9.2-9/jump", Jumps},
+    {"world/9.2-10/past-stamp", FromThePast},
     {"world/4.3-1/first-look", FirstLook},
     {"world/4.3-1/second-look", SecondLook},
     {"world/8.2-7/unknown-blocks", UnknownBlocks},
     {"world/6.2-1/flood", Flood},
-    {"world/8.2-1/major", Major},
-    {"world/8.2-2/minor", Minor},
-    {"world/8.2-3/hash", Hash},
-    {"world/5.2-9/initialising", Initialising},
-    {"world/9.1-1/wrong-headers", WrongHeaders},
-};
-
-constexpr WorldCase kEnds[] = {
-    {"world/5.4-1/silent", Silent},
-    {"world/7.4-7/restart", Restarts},
-    {"world/5.3-5/closes", Closes},
-    {"world/4.2-1/mid-write", MidWrite},
+    {"world/8.2-1/major", RefusesMajor},
+    {"world/8.2-2/minor", RefusesMinor},
+    {"world/8.2-3/hash", RefusesHash},
+    {"world/5.2-9/initialising", WaitsForReady},
+    {"world/9.1-1/wrong-headers", RefusesWrongHeaders},
 };
 
 }  // namespace
 
 std::span<const WorldCase> WorldNonsenseCases() {
-  return kNonsense;
-}
-std::span<const WorldCase> WorldEndCases() {
-  return kEnds;
+  return kCases;
 }
 
 }  // namespace rikiseki::protocol::check

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cmath>
-#include <thread>
 
 #include "common/clock.h"
 
@@ -16,19 +14,6 @@ constexpr double kApproachPerFrame = 0.0004;  // m
 constexpr double kPressForce = 0.5;           // N: enough to be seen, gentle for a person
 constexpr std::int64_t kRestNs = 80'000'000;  // at rest when the force holds this long
 constexpr double kFarthestPress = 0.04;       // m
-
-std::unique_ptr<PeerView> WaitForPeer(const std::string& instance, Role role, double patience_s) {
-  const AttachRequest request{.instance = instance, .role = role, .required = {}, .owners = {}};
-  const std::int64_t limit = MonotonicNow() + static_cast<std::int64_t>(patience_s * 1e9);
-  for (;;) {
-    AttachResult result = Attach(request);
-    if (result.status == AttachStatus::kAttached) return std::move(result.view);
-    if (MonotonicNow() > limit) {
-      throw SegmentError(1, "no haptic side to judge: " + result.text);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-}
 
 }  // namespace
 
@@ -97,6 +82,17 @@ void WorldPlayer::Leave() {
   Until([&] { return Force() < kZeroForce; }, 1);
 }
 
+void WorldPlayer::NeverTaken(const std::function<void(SegmentHeader&)>& alter, SegmentState state,
+                             const std::string& what) {
+  Open(alter, state);
+  const std::size_t from = seen().size();
+  Run(0.3);
+  for (std::size_t i = from; i < seen().size(); ++i) {
+    Require(seen()[i].world_epoch != segment_->epoch(), "frames are displayed though " + what);
+    Require(Norm(seen()[i].force) < kZeroForce, "force though " + what);
+  }
+}
+
 void WorldPlayer::Book(const HapticTick& tick) {
   if (!open()) return;
   const Totals now = TotalsOf(tick);
@@ -118,8 +114,7 @@ void WorldPlayer::Drain() {
     if (status == ReadStatus::kFresh) {
       judge_.Tick(tick_, ticks_.received());
       Book(tick_);
-      longest_pause_ns_ =
-          std::max(longest_pause_ns_, static_cast<std::int64_t>(tick_.previous_duration_ns));
+      pace_.Note(static_cast<std::int64_t>(tick_.previous_duration_ns));
       continue;
     }
     monitor_.Judge(kSound, status != ReadStatus::kRejected, [&] {
@@ -174,7 +169,8 @@ void WorldPlayer::Publish(const WorldFrame& frame) {
 
 void WorldPlayer::PublishSpoilt(
     const WorldFrame& frame,
-    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil) {
+    const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+    std::int64_t stamp_offset_ns) {
   judge_.Poison(segment_->epoch(), frame.frame);
   std::vector<std::uint64_t> words(kWorldFrameBytes / 8);
   Encoded encoded = Encode(frame, words);
@@ -182,21 +178,18 @@ void WorldPlayer::PublishSpoilt(
   const std::size_t room = writer_.ring().payload_bytes;
   const std::size_t stored = std::min<std::size_t>(encoded.used_bytes, room) / 8;
   writer_.Publish(std::span<const std::uint64_t>(words).first(stored), encoded,
-                  static_cast<std::uint64_t>(MonotonicNow()));
+                  static_cast<std::uint64_t>(MonotonicNow() + stamp_offset_ns));
+}
+
+void WorldPlayer::Jump(std::uint64_t numbers) {
+  frame_ += numbers;
+  writer_.SetPublished(writer_.published() + numbers);
 }
 
 void WorldPlayer::Step() {
-  const std::int64_t now = MonotonicNow();
-  if (last_step_ns_ != 0) longest_pause_ns_ = std::max(longest_pause_ns_, now - last_step_ns_);
-  last_step_ns_ = now;
+  const std::int64_t now = pace_.Step(*peer_, Role::kHaptic);
   Drain();
-  if (now - last_alive_ns_ > 100'000'000) {
-    last_alive_ns_ = now;
-    if (const auto health = Health()) judge_.SetSlewLimit(health->slew_limit);
-    if (!peer_->OwnerAlive() || peer_->State() == SegmentState::kClosed) {
-      throw SegmentError(1, "the haptic side ended while it was judged");
-    }
-  }
+  if (const auto health = Health()) judge_.SetSlewLimit(health->slew_limit);
   if (open() && beating) {
     segment_->Heartbeat(frame_, static_cast<std::uint64_t>(now));
   }
@@ -215,13 +208,7 @@ void WorldPlayer::Run(double seconds) {
 }
 
 bool WorldPlayer::Until(const std::function<bool()>& done, double seconds) {
-  const std::int64_t limit = MonotonicNow() + static_cast<std::int64_t>(seconds * 1e9);
-  last_step_ns_ = 0;
-  while (!done()) {
-    if (MonotonicNow() > limit) return false;
-    Step();
-  }
-  return true;
+  return pace_.Until([this] { Step(); }, done, seconds);
 }
 
 void WorldPlayer::Couple() {

@@ -13,6 +13,7 @@
 #include "protocol/messages.h"
 #include "protocol/tools/check/case.h"
 #include "protocol/tools/check/haptic_judge.h"
+#include "protocol/tools/check/pace.h"
 #include "protocol/tools/check/played_segment.h"
 
 namespace rikiseki::protocol::check {
@@ -52,6 +53,9 @@ class WorldPlayer {
   void Die() { segment_->Die(); }
   /// Without a segment for a while, so that the next case starts from nothing.
   void Leave();
+  /// A segment that must be left alone; fails if it is taken.
+  void NeverTaken(const std::function<void(SegmentHeader&)>& alter, SegmentState state,
+                  const std::string& what);
 
   // ---- Time. Everything happens in here.
   /// One pass: reads ticks, publishes a frame if one is due, sleeps about a millisecond.
@@ -73,9 +77,12 @@ class WorldPlayer {
   WorldFrame NextFrame();  // the next number, our planes, our ack
   void Publish(const WorldFrame& frame);
   /// Publishes the bytes of `frame` after `spoil` changed them; the number counts as used, and the
-  /// haptic side must never name it.
+  /// haptic side must never name it. The stamp is `stamp_offset_ns` later than now.
   void PublishSpoilt(const WorldFrame& frame,
-                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil);
+                     const std::function<void(std::vector<std::uint64_t>&, Encoded&)>& spoil,
+                     std::int64_t stamp_offset_ns = 0);
+  /// The numbers of messages and frames grow by `numbers` at once.
+  void Jump(std::uint64_t numbers);
   std::uint64_t frame() const { return frame_; }
   RawWriter& writer() { return writer_; }
 
@@ -94,8 +101,8 @@ class WorldPlayer {
   void Couple();
 
   /// The longest pause between two steps of ours, and the longest tick of the peer, since Calm().
-  std::int64_t longest_pause_ns() const { return longest_pause_ns_; }
-  void Calm() { longest_pause_ns_ = 0; }
+  std::int64_t longest_pause_ns() const { return pace_.longest_pause_ns(); }
+  void Calm() { pace_.Calm(); }
 
   std::uint32_t body = 7;
   std::uint32_t generation = 3;
@@ -119,9 +126,7 @@ class WorldPlayer {
   RawWriter writer_;
   std::uint64_t frame_ = 0;
   std::int64_t next_frame_ns_ = 0;
-  std::int64_t last_step_ns_ = 0;
-  std::int64_t last_alive_ns_ = 0;
-  std::int64_t longest_pause_ns_ = 0;
+  Pace pace_;
 
   bool any_tick_ = false;
   std::uint64_t baseline_tick_ = 0;

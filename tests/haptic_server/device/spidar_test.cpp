@@ -27,12 +27,14 @@ class ScriptedBoard final : public MotorBoard {
     tension = out;
     return answers;
   }
+  bool Enabled() const noexcept override { return enabled; }
   const Hand* hand() const noexcept override { return nullptr; }
   std::string Name() const override { return "scripted"; }
 
   EncoderCounts counts{};
   FourStrings tension{};
   bool answers = true;
+  bool enabled = true;
 };
 
 EncoderCounts CountsAt(const Vec3& position) {
@@ -60,6 +62,22 @@ TEST_CASE("the SPIDAR measures where the grip is, and how fast") {
   }
   // One count is 29 mm/s by backward difference; the filter takes most of it away.
   REQUIRE((sample.velocity - Vec3(0.4, -0.2, 0)).norm() < 0.02);
+}
+
+TEST_CASE("an open enable input is told, even by a device whose strings slipped") {
+  auto owned = std::make_unique<ScriptedBoard>();
+  ScriptedBoard& board = *owned;
+  Spidar spidar(Cube(), std::move(owned));
+  DeviceSample sample;
+  spidar.Read(0, sample);
+  REQUIRE(sample.enabled);
+  board.enabled = false;
+  spidar.Read(1'000'000, sample);
+  REQUIRE_FALSE(sample.enabled);
+  sample = {};
+  board.counts[1] += 400;
+  REQUIRE(spidar.Read(2'000'000, sample) == DeviceStatus::kFault);
+  REQUIRE_FALSE(sample.enabled);
 }
 
 TEST_CASE("a slipped string and a silent board are faults, and pass") {

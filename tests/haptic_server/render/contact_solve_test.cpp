@@ -31,7 +31,7 @@ std::vector<HalfSpace> ParsePlanes(const std::string& text) {
 }
 
 TEST_CASE("nearest points match the independent reference") {
-  const auto rows = ReadCsv(RIKISEKI_SOURCE_DIR "/tests/data/haptic_server/plane_cases.csv");
+  const auto rows = ReadCsv(RIKISEKI_SOURCE_DIR "/tests/data/plane_cases.csv");
   REQUIRE(rows.size() == 105);
   for (const CsvRow& row : rows) {
     const auto number = [&](const char* column) { return std::stod(row.at(column)); };

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <vector>
 
 namespace rikiseki::haptic {
 namespace {
@@ -167,6 +168,95 @@ TEST_CASE("a surface that appears above the finger rises to its place without a 
                 kNoCopies);
   REQUIRE(track.Surfaces(kNoCopies)[1].plane.point.y() ==
           -0.0071);  // 0.9 mm deep: a normal approach
+}
+
+TEST_CASE("a plane may bring a recovery time of its own, and rises within it") {
+  for (const double recovery_s : {0.02, 0.5}) {
+    FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+    protocol::Plane plane = PlaneAt(1, Vec3::Zero(), Vec3::UnitX());
+    plane.recovery_s = recovery_s;
+    const std::array<FingerState, 1> finger = {FingerState{Vec3(-0.004, 0, 0), 0.001, 0}};
+    track.Receive(Frame({plane}), finger, kNoCopies);
+    const int ticks = static_cast<int>(recovery_s * 1000);
+    for (int k = 0; k <= ticks + 5; ++k) {
+      const double left = std::max(0.0, 1 - k / static_cast<double>(ticks));
+      REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(-0.005 * left).margin(1e-15));
+      REQUIRE(track.Surfaces(kNoCopies)[0].strength == 1);
+      track.Advance(1);
+    }
+  }
+}
+
+TEST_CASE("a surface that vanishes while it is pressed fades where it was; others go at once") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  protocol::Plane pressed = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  protocol::Plane slow = PlaneAt(2, Vec3(0.003, 0, 0), Vec3::UnitY());
+  slow.recovery_s = 0.4;
+  const protocol::Plane free = PlaneAt(3, Vec3(0, 0, -0.02), Vec3::UnitZ());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0.008, 0), 0.01, 1}};
+  track.Receive(Frame({pressed, slow, free}), finger, kNoCopies);
+  track.Advance(50);
+  pressed.point[0] = 0.005;  // on the way there when it vanishes
+  track.Receive(Frame({pressed, slow, free}), finger, kNoCopies);
+  track.Advance(25);
+  track.Receive(Frame({}), finger, kNoCopies);
+  REQUIRE_FALSE(track.Has(3, 1, 0));
+  for (int k = 0; k < 400; ++k) {
+    const auto surfaces = track.Surfaces(kNoCopies);
+    REQUIRE(surfaces.size() == (k < 100 ? 2U : 1U));
+    if (k < 100) {
+      REQUIRE(surfaces[0].feature == 1);
+      REQUIRE(surfaces[0].plane.point.x() == Approx(0.004));
+      REQUIRE(surfaces[0].strength == Approx(1 - k / 100.0));
+    }
+    REQUIRE(surfaces.back().feature == 2);
+    REQUIRE(surfaces.back().strength == Approx(1 - k / 400.0));
+    if (k % 50 == 49) track.Receive(Frame({}), finger, kNoCopies);  // frames go on
+    track.Advance(1);
+  }
+  REQUIRE(track.Surfaces(kNoCopies).empty());
+}
+
+TEST_CASE("a surface that comes back while it fades grows strong again without a step") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  const protocol::Plane plane = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0, 0), 0.01, 1}};
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  track.Receive(Frame({}), finger, kNoCopies);
+  track.Advance(70);
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 1);
+  for (int k = 0; k < 90; ++k) {
+    REQUIRE(track.Surfaces(kNoCopies)[0].strength == Approx(std::min(1.0, 0.3 + k / 100.0)));
+    track.Advance(1);
+  }
+  REQUIRE(track.Has(3, 1, 0));
+}
+
+TEST_CASE("a body of another generation takes the place of the old one at once") {
+  FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+  protocol::Plane plane = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.01, 0, 0), 0.01, 1}};
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  ++plane.generation;
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  REQUIRE(track.Surfaces(kNoCopies).size() == 1);
+  REQUIRE(track.Surfaces(kNoCopies)[0].generation == plane.generation);
+}
+
+TEST_CASE("a fading surface gives way to those of the frame when there is no room") {
+  FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+  const std::array<FingerState, 1> finger = {FingerState{Vec3::Zero(), 0.01, 1}};
+  std::vector<protocol::Plane> planes(protocol::kMaxPlanes,
+                                      PlaneAt(0, Vec3::Zero(), Vec3::UnitX()));
+  for (std::uint32_t i = 0; i < planes.size(); ++i) planes[i].feature = i;
+  track.Receive(Frame(planes), finger, kNoCopies);
+  for (std::uint32_t i = 0; i < planes.size(); ++i) planes[i].feature = 100 + i;
+  planes.pop_back();
+  track.Receive(Frame(planes), finger, kNoCopies);
+  const auto surfaces = track.Surfaces(kNoCopies);
+  REQUIRE(surfaces.size() == protocol::kMaxPlanes);
+  for (std::size_t i = 0; i + 1 < surfaces.size(); ++i) REQUIRE(surfaces[i].feature >= 100);
 }
 
 TEST_CASE("damaged planes and planes of other pointers are left out") {

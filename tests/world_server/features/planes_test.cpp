@@ -69,6 +69,43 @@ TEST_CASE("the radius grows by the way of two periods at the relative speed") {
   CHECK(FindPlanes(scene, states, generations, std::vector{finger}, reach, planes) == 1);
 }
 
+TEST_CASE("friction and the material's velocity are sent where finger and surface have friction") {
+  Scene scene = CubeOnFloor(0.4);
+  scene.bodies[0].colliders[0].friction = 0;  // ice
+  scene.bodies[1].colliders[0].static_friction = 0.9;
+  scene.bodies[1].colliders[0].recovery_s = 0.25;
+  std::vector<BodyState> states = {{}, {.pose = {.position = {0, 0, 0.03}}}};
+  states[1].velocity = {0.1, 0, 0};
+  states[1].angular_velocity = {0, 0, 2};
+  const std::vector<std::uint32_t> generations = {1, 1};
+  std::array<protocol::Plane, 4> planes;
+  Finger finger{.radius_m = 0.01, .position = {-0.04, 0.01, 0.03}};
+  const FeatureReach reach{.radius_m = 0.1, .period_s = 0.05};
+
+  REQUIRE(FindPlanes(scene, states, generations, std::vector{finger}, reach, planes) == 2);
+  for (int i = 0; i < 2; ++i) {
+    CHECK(planes[static_cast<std::size_t>(i)].velocity == protocol::Vector{});
+    CHECK(planes[static_cast<std::size_t>(i)].static_friction == 0);
+    CHECK(planes[static_cast<std::size_t>(i)].dynamic_friction == 0);
+  }
+  CHECK(planes[0].recovery_s == 0.25);
+
+  finger.friction = 0.1;
+  REQUIRE(FindPlanes(scene, states, generations, std::vector{finger}, reach, planes) == 2);
+  REQUIRE(planes[0].body == 1);
+  CHECK(planes[0].dynamic_friction == Approx(0.2));  // sqrt(0.1 0.4)
+  CHECK(planes[0].static_friction == Approx(0.3));   // sqrt(0.1 0.9)
+  // v + w x r at (-0.03, 0.01, 0.03): (0.1, 0, 0) + 2 z x (-0.03, 0.01, 0)
+  CHECK((ToVec3(planes[0].velocity) - Vec3(0.08, -0.06, 0)).norm() < 1e-15);
+  CHECK(planes[1].body == 0);
+  CHECK(planes[1].dynamic_friction == 0);
+  CHECK(planes[1].recovery_s == 0);
+
+  scene.bodies[1].colliders[0].static_friction.reset();
+  FindPlanes(scene, states, generations, std::vector{finger}, reach, planes);
+  CHECK(planes[0].static_friction == planes[0].dynamic_friction);
+}
+
 TEST_CASE("every pointer and every collider has its own plane; the nearest 32 are sent") {
   Scene scene;
   SceneBody body = test::Floor(1);

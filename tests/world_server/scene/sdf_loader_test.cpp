@@ -190,6 +190,64 @@ TEST_CASE("surfaces: friction, and stiffness only where the file gives it") {
       collider("<contact><ode><kp>1e12</kp></ode></contact>").stiffness_n_per_m.has_value());
 }
 
+namespace {
+
+// A static box whose <surface> holds `content`, which starts in line 5.
+std::string Surface(const std::string& content) {
+  return "<sdf version=\"1.9\" xmlns:rikiseki=\"urn:rikiseki\">\n<world name=\"w\">\n"
+         "<model name=\"m\"><static>1</static><link name=\"l\"><collision name=\"c\">" +
+         kBox + "\n<surface><friction><ode><mu>0.3</mu></ode></friction>\n" + content +
+         "\n</surface></collision></link></model></world></sdf>";
+}
+
+}  // namespace
+
+TEST_CASE("what SDF has no word for is read from rikiseki elements") {
+  const auto collider = [](const std::string& content) {
+    const LoadedScene loaded = LoadText(Surface(content));
+    CHECK(loaded.warnings.empty());
+    return loaded.scene.bodies.at(0).colliders.at(0);
+  };
+  const Collider plain = collider("");
+  CHECK_FALSE(plain.static_friction.has_value());
+  CHECK(plain.recovery_s == 0);
+  const Collider both = collider(
+      "<rikiseki:static_friction>0.45</rikiseki:static_friction>\n"
+      "<rikiseki:recovery_s>0.2</rikiseki:recovery_s>");
+  CHECK(both.friction == 0.3);
+  CHECK(both.static_friction == 0.45);
+  CHECK(both.recovery_s == 0.2);
+}
+
+TEST_CASE("a wrong rikiseki element is refused with file, line, name and what would be right") {
+  const auto refused = [](const std::string& content, const std::string& part) {
+    const std::string refusal = Refusal(Surface(content));
+    CAPTURE(refusal);
+    CHECK(refusal.starts_with("scene.sdf:6: <rikiseki:"));
+    CHECK(Contains(refusal, part));
+  };
+  refused("\n<rikiseki:static_friction>0.2</rikiseki:static_friction>",
+          "a number from 0.3, its <mu>, to 100 is expected");
+  refused("\n<rikiseki:static_friction>much</rikiseki:static_friction>", "= 'much'");
+  refused("\n<rikiseki:static_friction>inf</rikiseki:static_friction>", "is expected");
+  refused("\n<rikiseki:recovery_s>0</rikiseki:recovery_s>", "above 0, to 10 is expected");
+  refused("\n<rikiseki:recovery_s>200 ms</rikiseki:recovery_s>", "= '200 ms'");
+  refused("\n<rikiseki:recovery_s></rikiseki:recovery_s>", "= ''");
+  refused(
+      "<rikiseki:recovery_s>1</rikiseki:recovery_s>\n<rikiseki:recovery_s>1</rikiseki:recovery_s>",
+      "stands twice");
+  refused(
+      "\n<rikiseki:softness>1</rikiseki:softness>",
+      "<rikiseki:static_friction> and <rikiseki:recovery_s> in the <surface> of a collision do");
+  // Known, but in the wrong place.
+  const std::string misplaced = Refusal(
+      World("<model name=\"m\"><static>1</static>\n<rikiseki:recovery_s>1</rikiseki:recovery_s>"
+            "<link name=\"l\"><collision name=\"c\">" +
+            kBox + "</collision></link></model>"));
+  CAPTURE(misplaced);
+  CHECK(misplaced.starts_with("scene.sdf:4: <rikiseki:recovery_s> in <model> means nothing"));
+}
+
 TEST_CASE("an included model is found beside the scene") {
   const Folder folder;
   folder.Write(

@@ -1,0 +1,56 @@
+#include "haptic_server/render/surface_motion.h"
+
+#include <algorithm>
+
+namespace rikiseki::haptic {
+namespace {
+
+double HeightAbove(const HalfSpace& plane, const Vec3& point) {
+  return plane.normal.dot(point - plane.point);
+}
+
+}  // namespace
+
+double SurfaceMotion::Work(std::span<const Surface> surfaces, const Vec3& force,
+                           double elapsed_s) const noexcept {
+  if (count_ == 0 || force.isZero(0)) return 0;
+  // f = c e + rest, and e = sum of multiplier_i n_i: plane i carries c multiplier_i along its normal.
+  const double square = displacement_.squaredNorm();
+  if (!(square > 0)) return 0;
+  const double c = force.dot(displacement_) / square;
+  const Vec3 rest = force - c * displacement_;
+  double along_normals = 0;
+  double weight = 0;
+  Vec3 material = Vec3::Zero();  // m, times weight
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Pressing& before = pressing_[i];
+    const auto now = std::find_if(surfaces.begin(), surfaces.end(), [&](const Surface& surface) {
+      return surface.body == before.body && surface.generation == before.generation &&
+             surface.feature == before.feature;
+    });
+    if (now == surfaces.end()) continue;
+    along_normals += before.multiplier * (before.height - HeightAbove(now->plane, proxy_));
+    material += before.multiplier * elapsed_s * now->velocity;
+    weight += before.multiplier;
+  }
+  if (!(weight > 0)) return 0;
+  return c * along_normals + rest.dot(material) / weight;
+}
+
+void SurfaceMotion::Remember(std::span<const Surface> surfaces,
+                             const ContactSolution& contact) noexcept {
+  count_ = 0;
+  for (std::size_t i = 0; i < std::min(surfaces.size(), kMaxContactPlanes); ++i) {
+    if (!(contact.multiplier[i] > 0)) continue;
+    const Surface& surface = surfaces[i];
+    pressing_[count_++] = {.body = surface.body,
+                           .generation = surface.generation,
+                           .feature = surface.feature,
+                           .multiplier = contact.multiplier[i],
+                           .height = HeightAbove(surface.plane, contact.proxy)};
+  }
+  proxy_ = contact.proxy;
+  displacement_ = contact.displacement;
+}
+
+}  // namespace rikiseki::haptic

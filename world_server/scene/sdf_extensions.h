@@ -1,0 +1,25 @@
+// The `<rikiseki:...>` elements of an SDFormat file: what SDF has no word for. SDFormat lets elements
+// with a name space pass unread, so they are checked here to the letter.
+//
+//   in <surface> of a collision:
+//     <rikiseki:static_friction>  Coulomb, for the finger; from <mu> to 100; absent: as <mu>
+//     <rikiseki:recovery_s>       how long the surface's force takes to come and go, above 0 to 10 s
+#pragma once
+
+#include <sdf/Element.hh>
+
+#include "world_server/scene/scene.h"
+
+namespace rikiseki::world {
+
+/// Whether an element is one of ours, known or not.
+bool IsExtension(const sdf::ElementPtr& element);
+
+/// Throws ConfigError, with file, line and what would be right, for one that is not known there.
+void CheckExtension(const sdf::ElementPtr& parent, const sdf::ElementPtr& element);
+
+/// Fills in what the <surface> of a collision says. Throws ConfigError likewise. The collider's
+/// friction is known.
+void ReadSurfaceExtensions(const sdf::ElementPtr& collision, Collider& collider);
+
+}  // namespace rikiseki::world
