@@ -109,7 +109,7 @@ TEST_CASE("haptic_lab exits 1 where an expected result is missed, and only there
   const Ended missed = run("0.0859998056");  // 2e-9 off
   CHECK(missed.exit_code == 1);
   CHECK(Contains(missed.output, ",missed\n"));
-  const TemporaryFile local(kHeader + ",x_final_m\nn,P,EX,0.05,2000,0,0.5,local_M1,0,0.5\n");
+  const TemporaryFile local(kHeader + ",x_final_m\nn,P,EX,0.05,2000,0,0.5,local_M9,0,0.5\n");
   const Ended unsupported = Run("fig6 --cases " + local.path());
   CHECK(unsupported.exit_code == 0);
   CHECK(Contains(unsupported.output, ",0.5,,,,unsupported\n"));
@@ -156,12 +156,12 @@ TEST_CASE("haptic_lab runs its own grid, whole or in shards") {
   const TemporaryFile out("");
   const Ended ended = Run("fig6 --quick --out " + out.path());
   CHECK(ended.exit_code == 0);
-  CHECK(Contains(ended.output, "40 rows: 40 ok"));
+  CHECK(Contains(ended.output, "70 rows: 70 ok"));
   CHECK(Contains(ended.output, "spread"));
   CHECK(Contains(ReadAll(out.path()), "scenario,world_rule,Tw_s,kp,kd,M,method,phase_ticks,got_x"));
 
   const Ended shard = Run("fig6 --quick --jobs 2 --shard 2/3");
-  CHECK(Contains(shard.output, "13 rows: 13 ok"));
+  CHECK(Contains(shard.output, "23 rows: 23 ok"));
 }
 
 TEST_CASE("haptic_lab says when it cannot write") {
