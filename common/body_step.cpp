@@ -77,8 +77,9 @@ Row MakeRow(const Entry& body, const Entry& other, const Vec3& direction) {
   row.direction = direction;
   row.turn_body = body.arm.cross(direction);
   row.spin_body = *body.inverse_inertia * row.turn_body;
-  row.yield = body.inverse_mass + row.turn_body.dot(row.spin_body) + other.inverse_mass;
+  row.yield = body.inverse_mass + row.turn_body.dot(row.spin_body);
   if (other.inverse_inertia != nullptr) {
+    row.yield += other.inverse_mass;
     row.turn_other = other.arm.cross(direction);
     row.spin_other = *other.inverse_inertia * row.turn_other;
     row.yield += row.turn_other.dot(row.spin_other);
@@ -125,9 +126,7 @@ Rows MakeRows(const Island& island, const StepContact& contact, double step_s) {
   const Entry body = island.At(contact.body, now.point_W);
   Entry other;
   Vec3 slip = island.bodies[contact.body].state.VelocityAt(now.point_W) - contact.velocity;
-  if (contact.other == StepContact::kSurroundings) {
-    other.inverse_mass = contact.inverse_mass;
-  } else {
+  if (contact.other != StepContact::kSurroundings) {
     other = island.At(contact.other, now.point_W);
     slip -= island.bodies[contact.other].state.VelocityAt(now.point_W);
   }
@@ -271,7 +270,8 @@ void StepBodies(std::span<StepBody> bodies, std::span<StepContact> contacts, dou
 }
 
 int SubstepCount(double time_s, double longest_s) noexcept {
-  return static_cast<int>(std::clamp(std::ceil(time_s / longest_s - 0.25), 1.0, 1e6));
+  const double count = std::ceil(time_s / longest_s - 0.25);
+  return count > 1 ? static_cast<int>(std::min(count, 1e6)) : 1;  // 1 for what is no number
 }
 
 double InverseEffectiveMass(const BodyInertia& inertia, const Pose& pose_WB, const Vec3& point_W,

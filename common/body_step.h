@@ -29,7 +29,7 @@ struct StepBody {
 };
 
 /// A point of a body that a plane keeps out. The plane belongs to another of the bodies, or to the
-/// surroundings.
+/// surroundings, which do not yield: a heavy neighbour mostly rests on something itself.
 struct StepContact {
   static constexpr std::size_t kSurroundings = static_cast<std::size_t>(-1);
 
@@ -41,7 +41,6 @@ struct StepContact {
   Vec3 normal = Vec3::UnitZ();   // unit, out of the other: in W, or in the other's frame
   double friction = 0;           // Coulomb, of the pair
   Vec3 velocity = Vec3::Zero();  // m/s, of surroundings that move
-  double inverse_mass = 0;       // 1/kg, of surroundings that yield
   double normal_impulse = 0;     // N s, of the step before: where the solver starts
 };
 

@@ -29,7 +29,7 @@ enum class ReplayRule {
 };
 
 struct CouplingSettings {
-  protocol::Coupling coupling = protocol::Coupling::kImpulse;
+  protocol::Coupling coupling = protocol::Coupling::kLocal;
   double force_cap_n = 20;  // bounds what is applied after a gap: at most force_cap * gap
   ReplayRule replay = ReplayRule::kTicks;
   double gap_ms = 0;  // 0 = max(100 ms, 3 periods)

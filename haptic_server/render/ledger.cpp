@@ -183,7 +183,8 @@ void Ledger::Book(const Entry& entry) noexcept {
     Vec3 force = Vec3::Zero();
     Vec3 point = account.point;
     for (const BodyShare& share : entry.wanted) {
-      if (share.body == account.channel.body && share.generation == account.channel.generation &&
+      if (!share.fixed && share.body == account.channel.body &&
+          share.generation == account.channel.generation &&
           entry.pointer == account.channel.pointer) {
         force = -fraction * share.force;
         point = share.point;

@@ -10,8 +10,16 @@ namespace rikiseki::haptic {
 namespace {
 
 constexpr double kStiff = 1;        // k T^2/M + 2 d T/M, numerics section 4
+constexpr double kUnit = 1e-6;      // how far from 1 the length of a unit vector may be
 constexpr double kFarthest = 1e6;   // m, m/s, rad/s: beyond, a copy has come apart
 constexpr double kNoDepth = 1e-15;  // m: no direction
+constexpr double kLightest = 1e-9;  // kg; heaviest likewise: of the wire
+constexpr double kHeaviest = 1e9;
+
+// What a step may cost: the world's substeps are not followed below this length [s], nor is a tick
+// of many times its period divided into more substeps than so many whole ones have.
+constexpr double kShortestSubstep = 1e-4;
+constexpr int kLongestTick = 8;
 
 Mat3 ToInertia(const std::array<double, 6>& i) {
   Mat3 inertia;
@@ -50,10 +58,33 @@ bool LocalBodies::Copies::Sound() const noexcept {
                      });
 }
 
+// What steps can be made of.
+bool LocalBodies::Copies::Usable() const noexcept {
+  const auto body_end = bodies.begin() + static_cast<std::ptrdiff_t>(body_count);
+  const auto contact_end = contacts.begin() + static_cast<std::ptrdiff_t>(contact_count);
+  return Sound() &&
+         std::all_of(bodies.begin(), body_end,
+                     [](const StepBody& body) {
+                       const BodyInertia& inertia = body.inertia;
+                       return inertia.mass_kg >= kLightest && inertia.mass_kg <= kHeaviest &&
+                              inertia.inertia_B.diagonal().minCoeff() > 0 &&
+                              inertia.inertia_B.determinant() > 0 &&
+                              inertia.inverse_B.allFinite() && Bounded(body.acceleration) &&
+                              Bounded(body.angular_acceleration) &&
+                              std::abs(body.state.pose.orientation.norm() - 1) < kUnit;
+                     }) &&
+         std::all_of(contacts.begin(), contact_end, [](const StepContact& contact) {
+           return Bounded(contact.p_B) && Bounded(contact.point) && Bounded(contact.velocity) &&
+                  std::abs(contact.normal.norm() - 1) < kUnit && contact.friction >= 0 &&
+                  contact.friction <= kFarthest && std::isfinite(contact.normal_impulse);
+         });
+}
+
 void LocalBodies::Load(const protocol::WorldFrame& frame, Copies& copies) const noexcept {
   copies.body_count = std::min<std::size_t>(frame.local_body_count, kMaxStepBodies);
   copies.contact_count = 0;
-  copies.longest_substep_s = static_cast<double>(frame.local_substep_ns) * 1e-9;
+  const double world_substep_s = static_cast<double>(frame.local_substep_ns) * 1e-9;
+  copies.longest_substep_s = std::max(world_substep_s, kShortestSubstep);
   for (std::size_t i = 0; i < copies.body_count; ++i) {
     const protocol::LocalBody& from = frame.local_bodies[i];
     copies.identities[i] = {from.body, from.generation};
@@ -68,7 +99,7 @@ void LocalBodies::Load(const protocol::WorldFrame& frame, Copies& copies) const 
   }
   // Impulses of the world's substep, for a step of ours.
   const double step_s = period_s_ / SubstepCount(period_s_, copies.longest_substep_s);
-  const double warmth = step_s / copies.longest_substep_s;
+  const double warmth = world_substep_s > 0 ? step_s / world_substep_s : 0;
   for (std::size_t i = 0; i < copies.body_count; ++i) {
     const protocol::LocalBody& from = frame.local_bodies[i];
     const Pose& pose_WB = copies.bodies[i].state.pose;
@@ -93,7 +124,6 @@ void LocalBodies::Load(const protocol::WorldFrame& frame, Copies& copies) const 
         to.normal = pose_OW.orientation * normal;
       } else {
         to.velocity = ToVec3(plane.other_velocity);
-        to.inverse_mass = plane.other_inverse_mass;
       }
     }
   }
@@ -104,19 +134,25 @@ void LocalBodies::Receive(const protocol::WorldFrame& frame, std::uint64_t tick)
   const bool knows_us =
       frame.acked_epoch != 0 && (own_epoch_ == 0 || frame.acked_epoch == own_epoch_);
   const std::uint64_t next = knows_us ? frame.acked_tick + 1 : tick;
-  if (next > tick || tick - next > history_.size()) return;  // of no tick that we remember
-  Load(frame, arriving_);
-  ticks_per_frame_ = std::max<std::int64_t>(
-      1, std::llround(static_cast<double>(frame.period_ns) * 1e-9 / period_s_));
+  if (next > tick || tick - next >= history_.size()) return Clear();  // forgotten by then
+  // Where frames come so fast that none would be caught up with, the one that is nearer goes on.
+  if (catching_up_ && next_replay_ > next) return;
+  Load(frame, scratch_);
+  if (!scratch_.Usable()) return Clear();
+  arriving_ = scratch_;
   next_replay_ = next;
+  const auto behind = static_cast<std::int64_t>(tick - next);
+  const std::int64_t ticks_per_frame = std::max<std::int64_t>(
+      1, std::llround(static_cast<double>(frame.period_ns) * 1e-9 / period_s_));
+  replay_per_tick_ = std::max(kReplayPerTick, 2 * behind / ticks_per_frame + 2);
   catching_up_ = true;
-  LetIn(arriving_);
+  LetIn(arriving_, static_cast<double>(behind) * period_s_);
   if (next_replay_ == tick) TakeOver();
 }
 
-// Bodies that have no copy yet are shown where the frame saw them, and coast until it is caught up
-// with.
-void LocalBodies::LetIn(const Copies& arriving) noexcept {
+// Bodies that have no copy yet are shown where their velocity has brought them since the frame, and
+// coast until it is caught up with.
+void LocalBodies::LetIn(const Copies& arriving, double age_s) noexcept {
   for (std::size_t i = 0; i < arriving.body_count; ++i) {
     const Identity& identity = arriving.identities[i];
     if (live_.Place(identity.body, identity.generation) < live_.body_count) continue;
@@ -126,6 +162,8 @@ void LocalBodies::LetIn(const Copies& arriving) noexcept {
     StepBody& body = live_.bodies[live_.body_count++];
     body = arriving.bodies[i];
     body.acceleration = body.angular_acceleration = Vec3::Zero();
+    body.state.pose.position += age_s * body.state.velocity;
+    AdvanceRotation(body.inertia, age_s, body.state);
     live_.longest_substep_s = arriving.longest_substep_s;
   }
 }
@@ -191,7 +229,9 @@ void LocalBodies::Advance(Copies& copies, const TickRecord& record) noexcept {
     ApplyImpulse(body.inertia, push.impulse,
                  push.angular_impulse - body.state.pose.position.cross(push.impulse), body.state);
   }
-  const int substeps = SubstepCount(record.length_s, copies.longest_substep_s);
+  if (!(record.length_s > 0)) return;
+  const int substeps = std::min(SubstepCount(record.length_s, copies.longest_substep_s),
+                                kLongestTick * SubstepCount(period_s_, copies.longest_substep_s));
   for (int i = 0; i < substeps; ++i) {
     StepBodies(std::span(copies.bodies).first(copies.body_count),
                std::span(copies.contacts).first(copies.contact_count), record.length_s / substeps,
@@ -212,9 +252,7 @@ void LocalBodies::Step(std::uint64_t tick, std::span<const BodyImpulse> impulses
 }
 
 void LocalBodies::CatchUp(std::uint64_t tick) noexcept {
-  const auto behind = static_cast<std::int64_t>(tick + 1 - next_replay_);
-  std::int64_t budget = std::max(kReplayPerTick, 2 * behind / ticks_per_frame_ + 1);
-  while (budget-- > 0 && next_replay_ <= tick) {
+  for (std::int64_t i = 0; i < replay_per_tick_ && next_replay_ <= tick; ++i) {
     Advance(arriving_, history_[next_replay_ & (history_.size() - 1)]);
     ++next_replay_;
   }

@@ -26,8 +26,9 @@ struct BodyImpulse {
 
 inline constexpr std::size_t kMaxTickImpulses = 8;  // in one tick, by a few fingers
 
-/// Ticks repeated beside the live one, at least: 4 us each in contact. More where a frame would
-/// otherwise not be caught up with before the next.
+/// Ticks repeated beside the live one, at least: 4 us each in contact. Where a frame is so old that
+/// this would not catch up before the next, 2 more than twice its age over the world's period: half
+/// a period then does.
 inline constexpr std::int64_t kReplayPerTick = 8;
 
 class LocalBodies {
@@ -38,8 +39,10 @@ class LocalBodies {
   LocalBodies(std::int64_t period_ns, std::uint64_t history_ticks, std::uint64_t own_epoch,
               PositionRule rule);
 
-  /// A frame arrived before tick `tick`. Bodies that it does not hold have no copy any more; new
-  /// ones have one from now on. // RT:
+  /// A frame arrived before tick `tick`. Bodies that it does not hold lose their copy when it is
+  /// caught up with; new ones have one from now on. No copies at all after a frame that is of no
+  /// tick we remember or that no step can be made of. A frame that comes while a nearer one is being
+  /// caught up with is ignored. // RT:
   void Receive(const protocol::WorldFrame& frame, std::uint64_t tick) noexcept;
 
   /// The world is gone. // RT:
@@ -76,6 +79,7 @@ class LocalBodies {
 
     std::size_t Place(std::uint32_t body, std::uint32_t generation) const noexcept;
     bool Sound() const noexcept;
+    bool Usable() const noexcept;
   };
   struct TickRecord {
     double length_s = 0;
@@ -84,7 +88,7 @@ class LocalBodies {
   };
 
   void Load(const protocol::WorldFrame& frame, Copies& copies) const noexcept;
-  void LetIn(const Copies& arriving) noexcept;
+  void LetIn(const Copies& arriving, double age_s) noexcept;
   void Advance(Copies& copies, const TickRecord& record) noexcept;
   void CatchUp(std::uint64_t tick) noexcept;
   void TakeOver() noexcept;
@@ -97,7 +101,7 @@ class LocalBodies {
   Copies arriving_;  // of the newest frame, still repeating ticks
   bool catching_up_ = false;
   std::uint64_t next_replay_ = 0;  // the tick that arriving_ repeats next
-  std::int64_t ticks_per_frame_ = 1;
+  std::int64_t replay_per_tick_ = kReplayPerTick;
   Copies scratch_;
   protocol::Reconciliation reconciliation_;
 };

@@ -32,18 +32,24 @@ EnergyMeter::EnergyMeter(const Settings& settings)
                        Seconds(settings.period_ns())),
       period_s_(Seconds(settings.period_ns())),
       history_(static_cast<std::size_t>(std::max<std::int64_t>(Ticks(kEnergyWindow, period_s_), 1)),
-               0.0) {}
+               Excess{}) {}
 
 void EnergyMeter::Measure(const EnergySample& sample) noexcept {
   double leak = 0;
   double lost = 0;
+  double injection = 0;
   if (known_) {
     const double given = force_.dot(sample.position - position_) - sample.surface_work;
     // The gain of the safety stage is no spring: what it changes is neither stored nor given back.
     leak = given + displayed_fraction_ * (sample.stored - stored_);
     lost = damping_ * sample.velocity.squaredNorm() * sample.duration_s;
     if (!std::isfinite(leak) || !std::isfinite(lost)) leak = lost = 0;
-    if (std::isfinite(given)) injected_ += given;
+    if (std::isfinite(given)) {
+      injection = given;
+      injected_ += given;
+      hand_work_ -= given + sample.surface_work;
+      surface_work_ += sample.surface_work;
+    }
     dissipated_ += lost;
   }
   known_ = true;
@@ -53,14 +59,18 @@ void EnergyMeter::Measure(const EnergySample& sample) noexcept {
 
   const bool begins = penetration_ == 0 && sample.penetration > 0;
   contact_leak_ = std::max(contact_leak_ + leak, begins ? 0.0 : -kLargestCredit);
-  excess_ += leak - lost;
+  excess_.leak += leak - lost;
+  excess_.injection += injection - lost;
   newest_ = (newest_ + 1) % history_.size();
-  const double over_window = excess_ - history_[newest_];
+  const Excess before = history_[newest_];
   history_[newest_] = excess_;
 
   WatchPeaks(sample.penetration);
   penetration_ = sample.penetration;
-  if (over_window > kUnstableEnergy && grown_ >= kGrowingPeaks) {
+  const bool leaks = excess_.leak - before.leak > kUnstableEnergy && grown_ >= kGrowingPeaks;
+  const bool is_driven =
+      excess_.injection - before.injection > kUnstableEnergy && grown_by_surface_ >= kGrowingPeaks;
+  if (leaks || is_driven) {
     if (unstable_ticks_ == 0) ++flagged_;
     unstable_ticks_ = Ticks(kStaysFlaggedS, period_s_);
   } else if (unstable_ticks_ > 0) {
@@ -71,16 +81,14 @@ void EnergyMeter::Measure(const EnergySample& sample) noexcept {
 void EnergyMeter::WatchPeaks(double penetration) noexcept {
   const double threshold = std::max(kCycleFraction * std::max(highest_, last_peak_), kCycleFloor);
   if (++ticks_since_peak_ > Ticks(kLongestCycleS, period_s_)) {
-    grown_ = 0;
+    grown_ = grown_by_surface_ = 0;
     last_peak_ = 0;
     ticks_since_peak_ = 0;
   }
   if (rising_) {
     highest_ = std::max(highest_, penetration);
     if (penetration >= highest_ - threshold) return;
-    grown_ = highest_ > last_peak_ && last_peak_ > 0 ? grown_ + 1 : 0;
-    last_peak_ = highest_;
-    ticks_since_peak_ = 0;
+    NotePeak();
     lowest_ = penetration;
     rising_ = false;
   } else {
@@ -89,6 +97,16 @@ void EnergyMeter::WatchPeaks(double penetration) noexcept {
     highest_ = penetration;
     rising_ = true;
   }
+}
+
+// From peak to peak the springs have gained what hand and surfaces put in, less what they took back.
+void EnergyMeter::NotePeak() noexcept {
+  const bool grew = highest_ > last_peak_ && last_peak_ > 0;
+  grown_ = grew ? grown_ + 1 : 0;
+  grown_by_surface_ = grew && surface_work_ > hand_work_ ? grown_by_surface_ + 1 : 0;
+  last_peak_ = highest_;
+  ticks_since_peak_ = 0;
+  hand_work_ = surface_work_ = 0;
 }
 
 void EnergyMeter::Displayed(const Vec3& force, const Vec3& ground, const Vec3& rendered) noexcept {

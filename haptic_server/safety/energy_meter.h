@@ -31,10 +31,11 @@ struct EnergySample {
 /// E_k = E_(k-1) + f_(k-1) . (x_k - x_(k-1)) - (work of the moving surfaces): exact, for the force
 /// is held. Positive = injected.
 ///
-/// A pressed spring gives back later what it holds, and that is no injection: instability and
-/// controller are judged by the *leak*, E plus what the springs hold. Each tick adds f_(k-1) dx plus
-/// the share of the spring's energy that is displayed, for a spring alone k/2 |de|^2 > 0: the leak
-/// of the zero-order hold.
+/// A pressed spring gives back later what it holds: a hand that presses deeper each time and lets go
+/// is no instability. The *leak*, E plus what the springs hold, leaves that out. Each tick adds
+/// f_(k-1) dx plus the share of the spring's energy that is displayed, for a spring alone k/2 |de|^2 >
+/// 0: what the zero-order hold leaks. Controller and flag go by it. Where it is the bodies that press
+/// deeper each time, driven by their coupling and not by the hand, the flag goes by E itself.
 class EnergyMeter {
  public:
   explicit EnergyMeter(const Settings& settings);
@@ -60,6 +61,7 @@ class EnergyMeter {
 
  private:
   void WatchPeaks(double penetration) noexcept;
+  void NotePeak() noexcept;
 
   double damping_;          // N s/m, b
   double largest_braking_;  // N s/m
@@ -76,16 +78,24 @@ class EnergyMeter {
 
   double injected_ = 0;
   double dissipated_ = 0;
-  double contact_leak_ = 0;      // J, of the present contact, less what was braked
-  double excess_ = 0;            // J, leak less dissipation since the start
-  std::vector<double> history_;  // of excess_, one window back
+  double contact_leak_ = 0;  // J, of the present contact, less what was braked
+  // J since the start, less dissipation: the leak, and E itself; and both one window back.
+  struct Excess {
+    double leak = 0;
+    double injection = 0;
+  };
+  Excess excess_;
+  std::vector<Excess> history_;
   std::size_t newest_ = 0;
 
   double highest_ = 0;  // since the last valley
   double lowest_ = 0;   // since the last peak
   bool rising_ = true;
   double last_peak_ = 0;
-  int grown_ = 0;  // peaks in a row that were higher than the one before
+  int grown_ = 0;             // peaks in a row that were higher than the one before
+  int grown_by_surface_ = 0;  // likewise, into which surfaces put more work than the hand
+  double hand_work_ = 0;      // J, on the springs since the last peak
+  double surface_work_ = 0;   // J, likewise
   std::int64_t ticks_since_peak_ = 0;
 
   std::int64_t unstable_ticks_ = 0;  // for so many more it is called unstable

@@ -87,6 +87,14 @@ void PrintLoop(const Json& side) {
             << "  work       " << Durations(side["duration_us"]) << "\n";
 }
 
+// Local bodies; a jump beyond a millimetre says that the copies do not know something.
+void PrintCopies(const Json& reconciliation) {
+  if (reconciliation["frames"] == 0) return;
+  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
+            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
+            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
+}
+
 void PrintEnergy(const Json& energy) {
   const double injected_mj = energy["injected_j"].get<double>() * 1e3;
   std::cout << "  energy     the rendering has " << (injected_mj > 0 ? "given " : "absorbed ")
@@ -98,6 +106,14 @@ void PrintEnergy(const Json& energy) {
                     ? "UNSTABLE: it gives more energy than the device can dissipate"
                     : "no sign of instability")
             << ", flagged " << energy["times_flagged"] << " times since the start\n";
+}
+
+// Local bodies; a jump beyond a millimetre says that the copies do not know something.
+void PrintCopies(const Json& reconciliation) {
+  if (reconciliation["frames"] == 0) return;
+  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
+            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
+            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
 }
 
 void PrintHaptic(const Json& haptic) {
@@ -133,14 +149,6 @@ void PrintHaptic(const Json& haptic) {
             << haptic["page_faults"]["major"] << " major; largest force "
             << Number(haptic["largest_force_n"], 3) << " N, largest step "
             << Number(haptic["largest_force_step_n"], 4) << " N\n";
-}
-
-// Local bodies; a jump beyond a millimetre says that the copies do not know something.
-void PrintCopies(const Json& reconciliation) {
-  if (reconciliation["frames"] == 0) return;
-  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
-            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
-            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
 }
 
 void PrintBooks(const Json& books) {

@@ -54,6 +54,24 @@ TEST_CASE("a tick on the simulated SPIDAR allocates nothing and locks nothing") 
     plane.velocity = {0, 0.1, 0};
     plane.static_friction = plane.dynamic_friction = 0.1 * (i % 3);
   }
+  frame.local_body_count = 4;  // in contact with a floor and with each other
+  frame.local_substep_ns = 1'000'000;
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    protocol::LocalBody& local = frame.local_bodies[i];
+    local.body = i;
+    local.mass = i == 0 ? 1e-4 : 0.5;  // the first is too light for an explicit step
+    local.inertia = {local.mass * 1e-3, 0, 0, local.mass * 2e-3, 0, local.mass * 1e-3};
+    local.position = {0.05 + 0.06 * i, 0, 0};
+    local.velocity = {0.01, 0, 0};
+    local.contact_count = 16;
+    for (std::uint32_t j = 0; j < 16; ++j) {
+      protocol::ContactPlane& contact = local.contacts[j];
+      contact.other_body = j < 12 ? 100 : (i + 1) % 4;
+      contact.point = {j % 2 == 0 ? 0.03 : -0.03, j % 4 < 2 ? 0.03 : -0.03, -0.03};
+      contact.normal = {0, 0, 1};
+      contact.friction = 0.3;
+    }
+  }
   bool touched = false;
   long allocated = 0;
   long locked = 0;

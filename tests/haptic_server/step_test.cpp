@@ -1000,5 +1000,72 @@ TEST_CASE("settings that cannot be safe are refused by the step itself") {
   REQUIRE_THROWS_AS(HapticStep(settings, device, 0), std::invalid_argument);
 }
 
+// A world that is exact: body 1 of 0.5 kg is a free cube of 6 cm whose near face is at x = 0, pushed as
+// the channel says, tick by tick. Its frames are `latency` ticks old when they arrive.
+TEST_CASE("a free body with a copy is felt as without a world in between, at any latency") {
+  const double mass = 0.5;
+  for (const std::size_t latency : {0, 10, 50, 120}) {
+    Settings settings;
+    settings.render.damping_ns_per_m = 0;
+    Bench bench(settings);
+    std::vector<double> position = {0};  // after each tick
+    std::vector<double> velocity = {0};
+    double impulse = 0;
+    double largest = 0;
+    int in_contact = 0;
+    for (std::size_t k = 0; k < 2000; ++k) {
+      const double t = std::max(0.0, static_cast<double>(k) * 1e-3 - 0.4);
+      bench.device.next.position = {-0.02 + 0.02 * std::sin(2 * t), 0, 0};
+      bench.device.next.velocity = {t > 0 ? 0.04 * std::cos(2 * t) : 0, 0, 0};
+      const protocol::WorldFrame* frame = nullptr;
+      if (k % 50 == 0) {
+        const std::size_t acked = k > latency ? k - latency - 1 : 0;
+        const std::size_t after = k > latency ? acked + 1 : 0;
+        bench.planes = {WallFacing(Vec3(position[after], 0, 0), -Vec3::UnitX())};
+        protocol::WorldFrame& next = bench.NextFrame();
+        if (k > latency) {
+          next.acked_epoch = kOwnEpoch;
+          next.acked_tick = acked;
+        }
+        next.local_body_count = 1;
+        next.local_substep_ns = 1'000'000;
+        protocol::LocalBody& local = next.local_bodies[0];
+        local.body = 1;
+        local.mass = mass;
+        local.inertia = {3e-4, 0, 0, 3e-4, 0, 3e-4};
+        local.position = {position[after] + 0.03, 0, 0};
+        local.velocity = {velocity[after], 0, 0};
+        frame = &next;
+      }
+      const double felt = bench.Tick(frame).x();
+      CAPTURE(latency, k);
+      // The spring against the body as it is, the finger's sphere of 1 cm before it.
+      const double depth = bench.device.next.position.x() + 0.01 - position[k];
+      if (bench.message.pointers[0].reason == ForceReason::kContact) {
+        REQUIRE(felt == Approx(-2000 * std::max(0.0, depth)).margin(1e-8));
+        ++in_contact;
+        largest = std::max(largest, -felt);
+      }
+      for (std::uint32_t i = 0; i < bench.message.channel_count; ++i) {
+        const protocol::Channel& channel = bench.message.channels[i];
+        if (channel.body != 1) continue;
+        const double total = static_cast<double>(channel.impulse[0]) * 1e-12;
+        // A channel that was closed and freed begins again at 0.
+        velocity.resize(k + 1);
+        velocity.push_back(velocity[k] +
+                           (channel.opened_tick == k ? total : total - impulse) / mass);
+        impulse = total;
+      }
+      if (velocity.size() < k + 2) velocity.push_back(velocity[k]);
+      position.push_back(position[k] + 1e-3 * velocity[k + 1]);
+    }
+    CHECK(in_contact > 20);
+    CHECK(largest > 1);
+    CHECK(position.back() > 0.01);
+    CHECK(bench.step.health().reconciliation.frames > 20);
+    CHECK(bench.step.health().reconciliation.largest_jump < 1e-11);
+  }
+}
+
 }  // namespace
 }  // namespace rikiseki::haptic

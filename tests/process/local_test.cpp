@@ -165,7 +165,7 @@ TEST_CASE(
   // A 20 g block is gone after a touch of some ten milliseconds; what rings on is a buzz.
   const std::vector<double> forces = Forces(watch.All(), 2000);
   INFO(motion.name << ", world at " << rate_hz << " Hz");
-  CHECK(BuzzRms(forces) <= 0.5);
+  CHECK(BuzzRms(forces) <= 0.2);  // measured: local 0.01 to 0.07, impulse 0.3 to 0.45
   const protocol::HapticHealth health = ReadHapticHealth(*haptic);
   CHECK(health.energy.unstable == 0);
   CHECK(health.reconciliation.newest_jump < 0.002);

@@ -62,6 +62,7 @@ class Interrupted final : public DynamicsWorld {
   void ApplyAndStep(std::span<const Kick>, double) override {
     if (interrupt_) interrupt_();
   }
+  bool FindContacts(std::size_t, double, std::vector<ContactSite>&) const override { return false; }
 
  private:
   std::function<void()>& interrupt_;

@@ -51,6 +51,7 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
   CHECK(shipped.loop.rate_hz == defaults.loop.rate_hz);
   CHECK(shipped.physics.substep_ms == defaults.physics.substep_ms);
   CHECK(shipped.coupling.coupling == defaults.coupling.coupling);
+  CHECK(shipped.coupling.replay == defaults.coupling.replay);
   CHECK(shipped.coupling.force_cap_n == defaults.coupling.force_cap_n);
   CHECK(shipped.coupling.gap_ms == defaults.coupling.gap_ms);
   CHECK(shipped.features.radius_mm == defaults.features.radius_mm);
@@ -61,12 +62,13 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
 TEST_CASE("every key reaches its setting") {
   const Settings settings = LoadSettings(
       kShipped, {"loop.rate_hz=50", "scene.file=/a/b.sdf", "physics.substep_ms=2",
-                 "coupling.coupling=position", "coupling.force_cap_n=7", "coupling.gap_ms=250",
-                 "features.radius_mm=33", "features.finger_friction=0.5"});
+                 "coupling.coupling=position", "coupling.replay=lump", "coupling.force_cap_n=7",
+                 "coupling.gap_ms=250", "features.radius_mm=33", "features.finger_friction=0.5"});
   CHECK(settings.period_ns() == 20'000'000);
   CHECK(settings.scene.file == "/a/b.sdf");
   CHECK(settings.physics.substep_ms == 2);
   CHECK(settings.coupling.coupling == protocol::Coupling::kPosition);
+  CHECK(settings.coupling.replay == ReplayRule::kLump);
   CHECK(settings.coupling.force_cap_n == 7);
   CHECK(settings.gap_s() == 0.25);
   CHECK(settings.features.radius_mm == 33);

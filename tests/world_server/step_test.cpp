@@ -345,9 +345,50 @@ TEST_CASE("whatever arrives, the frame is finite and the body not thrown farther
   }
 }
 
+TEST_CASE(
+    "local: the push is repeated tick by tick, and the frame holds the body that was moved so") {
+  const double mass = 0.5;
+  WorldStep step = MakeStep(test::FreeCube(mass), Coupling::kLocal);
+  step.BeginHapticEpoch(1);
+  HapticTick message = At(0, {-0.045, 0, 0});
+  Push(message, 0, Vec3::Zero(), Vec3::Zero());
+  message.previous_duration_ns = 1'000'000;
+  step.Consume(message);
+  WorldFrame frame;
+  Vec3 impulse = Vec3::Zero();
+  Vec3 way = Vec3::Zero();
+  for (std::uint64_t k = 1; k <= 500; ++k) {
+    if (k % 7 != 0) impulse += Vec3(1e-4 * static_cast<double>(k % 13), 0, 2e-5);
+    way += 1e-3 * impulse / mass;
+    message.tick = k;
+    message.start_ns = k * 1'000'000;
+    message.pointers[0].position = ToArray(Vec3(way - Vec3(0.045, 0, 0)));
+    message.channels[0].impulse = Units(impulse);
+    // It spins as well, which does not move the centre.
+    step.Consume(message);
+    if (k % 50 != 0) continue;
+    step.Tick(kPeriod, frame);
+    REQUIRE(frame.coupling == Coupling::kLocal);
+    REQUIRE(frame.acked_tick == k);
+    REQUIRE(frame.local_body_count == 1);
+    REQUIRE(frame.local_substep_ns == 1'000'000);
+    const protocol::LocalBody& local = frame.local_bodies[0];
+    REQUIRE(local.body == 0);
+    REQUIRE(local.mass == mass);
+    REQUIRE(local.contact_count == 0);
+    REQUIRE((ToVec3(local.velocity) - impulse / mass).norm() < 1e-10);
+    REQUIRE((ToVec3(local.position) - way).norm() < 1e-9);
+  }
+  WorldStep other = MakeStep(test::FreeCube(mass), Coupling::kImpulse);
+  other.BeginHapticEpoch(1);
+  other.Consume(At(0, {-0.045, 0, 0}));
+  other.Tick(kPeriod, frame);
+  CHECK(frame.plane_count == 1);
+  CHECK(frame.local_body_count == 0);
+}
+
 TEST_CASE("what does not exist is refused") {
   const Scene scene = test::FreeCube(1);
-  CHECK_THROWS_AS(MakeStep(scene, Coupling::kLocal), std::invalid_argument);
   CHECK_THROWS_AS(WorldStep(Settings{}, scene, nullptr, 0), std::invalid_argument);
 }
 

@@ -28,9 +28,10 @@ Vec3 ProfileShare(const Vec3& total, const Vec3& moment, double block_s, int i, 
   const double half = 0.5 * (n - 1);
   const double squared = static_cast<double>(n) * n;
   Vec3 slope = (mean * (block_s * squared / 2) - moment) * (12 / (block_s * squared * n));
-  const double size = slope.norm() * half;
+  if (!slope.allFinite()) return mean;
+  const double size = slope.stableNorm() * half;
   const double bound = largest / n;
-  if (!(size <= bound)) slope *= std::isfinite(size) ? bound / size : 0;
+  if (size > bound) slope *= bound / size;
   return mean + slope * (i - half);
 }
 

@@ -26,12 +26,21 @@ class Search {
 
   const std::vector<Candidate>& found() const { return found_; }
 
+  /// Whether the contacts of `body` say where it touches `other`.
+  bool Tells(std::size_t body, std::size_t other) const {
+    return std::any_of(found_.begin(), found_.end(), [=](const Candidate& candidate) {
+      return candidate.body == body &&
+             std::any_of(candidate.sites.begin(), candidate.sites.end(),
+                         [=](const ContactSite& site) { return site.other == other; });
+    });
+  }
+
+ private:
   bool Has(std::size_t body) const {
     return std::any_of(found_.begin(), found_.end(),
                        [=](const Candidate& other) { return other.body == body; });
   }
 
- private:
   bool AddWithNeighbours(std::size_t body) {
     if (Has(body)) return true;
     if (found_.size() == room_) return false;
@@ -113,8 +122,9 @@ std::uint32_t FindLocalBodies(const Scene& scene, const DynamicsWorld& dynamics,
     local.angular_velocity = ToArray(state.angular_velocity);
     local.acceleration = ToArray(scene.gravity);
     for (const ContactSite& site : candidate.sites) {
-      // A contact of two copies stands with the one of the lower number.
-      if (site.other < candidate.body && search.Has(site.other)) continue;
+      // A contact of two copies stands with the one of the lower number, unless only the other
+      // reaches so far.
+      if (site.other < candidate.body && search.Tells(site.other, candidate.body)) continue;
       local.contacts[local.contact_count++] = ToPlane(site, generations);
     }
   }

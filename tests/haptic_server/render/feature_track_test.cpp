@@ -287,5 +287,109 @@ TEST_CASE("damaged planes and planes of other pointers are left out") {
   REQUIRE(track.Surfaces(kNoCopies).size() <= protocol::kMaxPlanes);
 }
 
+// Body 3 as the frame saw it, and a plane on it.
+protocol::LocalBody CopyOf(const BodyState& state) {
+  protocol::LocalBody local;
+  local.body = 3;
+  local.generation = 1;
+  local.position = ToArray(state.pose.position);
+  local.orientation = ToArray(state.pose.orientation);
+  local.velocity = ToArray(state.velocity);
+  local.angular_velocity = ToArray(state.angular_velocity);
+  return local;
+}
+
+const BodyState kMoving{
+    .pose = {.position = {0.1, 0.2, 0.3}, .orientation = Quat(0.9, 0.1, -0.3, 0.2).normalized()},
+    .velocity = {0.3, -0.1, 0},
+    .angular_velocity = {0, 1, 2}};
+
+void Hold(protocol::WorldFrame& frame, const BodyState& state) {
+  frame.local_body_count = 1;
+  frame.local_substep_ns = 1'000'000;
+  frame.local_bodies[0] = CopyOf(state);
+}
+
+TEST_CASE("a feature rides on its body's copy: point and normal move and turn with it") {
+  for (const DisplayRule rule :
+       {DisplayRule::kHold, DisplayRule::kInterpolate, DisplayRule::kExtrapolate}) {
+    FeatureTrack track(rule, kPeriodNs);
+    LocalBodies copies(kPeriodNs, 256, 0, PositionRule::kSecondOrder);
+    const HalfSpace seen{Vec3(0.12, 0.2, 0.31), kNormal0};
+    const Pose back = kMoving.pose.Inverse();
+    protocol::WorldFrame frame = Frame({PlaneAt(1, seen.point, seen.normal)});
+    Hold(frame, kMoving);
+    copies.Receive(frame, 0);
+    track.Receive(frame, kFarFinger, copies);
+    for (std::uint64_t k = 0; k < 100; ++k) {
+      const Surface& shown = track.Surfaces(copies)[0];
+      const double t = static_cast<double>(k) * 1e-3;
+      const Vec3& spin = kMoving.angular_velocity;
+      const Pose exact{
+          kMoving.pose.position + t * kMoving.velocity,
+          Quat(Eigen::AngleAxisd(t * spin.norm(), spin.normalized())) * kMoving.pose.orientation};
+      REQUIRE((shown.plane.point - exact * (back * seen.point)).norm() < 1e-12);
+      REQUIRE((shown.plane.normal - exact.orientation * (back.orientation * seen.normal)).norm() <
+              1e-12);
+      copies.Step(k, {}, 1e-3);
+      track.Advance(1);
+    }
+  }
+}
+
+TEST_CASE("getting a copy and losing it does not step what is displayed") {
+  for (const bool late : {false, true}) {
+    FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+    LocalBodies copies(kPeriodNs, 256, 0, PositionRule::kSecondOrder);
+    BodyState state = kMoving;
+    Vec3 before = Vec3::Zero();
+    const Vec3 point_B(0.02, 0.01, 0.03);
+    for (std::uint64_t k = 0; k < 1000; ++k) {
+      if (k % 50 == 0 && k > 0) {
+        // Copies in frames 4..9 and 13..; as old as they are seen, and the plane with them.
+        const std::uint64_t n = k / 50;
+        const double age = late ? 0.02 : 0;
+        BodyState seen = state;
+        seen.pose.position -= age * state.velocity;
+        seen.pose.orientation = Turned(state.pose.orientation, -age * state.angular_velocity);
+        protocol::WorldFrame frame =
+            Frame({PlaneAt(1, seen.pose * point_B, seen.pose.orientation * kNormal0)});
+        frame.acked_epoch = 5;
+        frame.acked_tick = k - 1 - (late ? 20 : 0);
+        if ((n >= 4 && n < 10) || n >= 13) Hold(frame, seen);
+        copies.Receive(frame, k);
+        track.Receive(frame, kFarFinger, copies);
+      }
+      const auto shown = track.Surfaces(copies);
+      if (!shown.empty()) {
+        const Vec3 now = shown[0].plane.point;
+        // The body goes 0.32 mm per tick; a plane that is caught up with covers a period in one.
+        if (k > 51) REQUIRE((now - before).norm() < 1.2e-3);
+        before = now;
+      }
+      copies.Step(k, {}, 1e-3);
+      track.Advance(1);
+      state.pose.position += 1e-3 * state.velocity;
+      state.pose.orientation = Turned(state.pose.orientation, 1e-3 * state.angular_velocity);
+    }
+    // In the end it rides, and is where the body is, not a period behind.
+    CHECK((before - Pose(state.pose) * point_B).norm() < 1e-3);
+  }
+}
+
+TEST_CASE("a copy that comes apart leaves its features where they were") {
+  FeatureTrack track(DisplayRule::kHold, kPeriodNs);
+  LocalBodies copies(kPeriodNs, 256, 0, PositionRule::kSecondOrder);
+  protocol::WorldFrame frame = Frame({PlaneAt(1, kPoint0, kNormal0)});
+  Hold(frame, kMoving);
+  copies.Receive(frame, 0);
+  track.Receive(frame, kFarFinger, copies);
+  const Vec3 shown = track.Surfaces(copies)[0].plane.point;
+  const BodyImpulse absurd{3, 1, Vec3(1e30, 0, 0), Vec3::Zero()};
+  copies.Step(0, std::span(&absurd, 1), 1e-3);
+  REQUIRE(copies.Find(3, 1) == nullptr);
+  CHECK(SameBits(track.Surfaces(copies)[0].plane.point, shown));
+}
+
 }  // namespace
 }  // namespace rikiseki::haptic

@@ -315,5 +315,86 @@ TEST_CASE("damaged forces and hostile acks overflow nothing") {
   }
 }
 
+TEST_CASE("the share of a fixed body goes to the ground, with its moment at its own point") {
+  Ledger ledger(kPeriodNs, 4096, 0);
+  REQUIRE(ledger.Open(1, 0, 0, 0));
+  REQUIRE(ledger.Open(2, 0, 0, 0));  // a channel from before body 2 was said to be fixed
+  const Vec3 push(0, 0, 3);
+  const Vec3 wall(-1, 2, 0);
+  const std::array<BodyShare, 2> shares = {
+      BodyShare{.body = 1, .force = push, .point = Vec3(0.1, 0, 0)},
+      BodyShare{.body = 2, .force = wall, .point = Vec3(0, 0.2, 0.3), .fixed = true}};
+  ledger.Book({.displayed = push + wall, .wanted = shares, .finger = Vec3(5, 5, 5)});
+  protocol::HapticTick message;
+  ledger.Write(message);
+  REQUIRE(message.channel_count == 2);
+  CHECK(message.channels[0].impulse == ImpulseUnits{0, 0, -3'000'000'000});
+  CHECK(message.channels[0].angular_impulse == ImpulseUnits{0, 300'000'000, 0});
+  CHECK(message.channels[1].impulse == ImpulseUnits{});
+  CHECK(message.channels[1].angular_impulse == ImpulseUnits{});
+  CHECK(message.ground.impulse == ImpulseUnits{1'000'000'000, -2'000'000'000, 0});
+  const Vec3 moment = -1e-3 * Vec3(0, 0.2, 0.3).cross(wall);
+  CHECK(message.ground.angular_impulse[0] == std::llround(moment.x() * 1e12));
+  CHECK(message.ground.angular_impulse[1] == std::llround(moment.y() * 1e12));
+  CHECK(message.ground.angular_impulse[2] == std::llround(moment.z() * 1e12));
+  REQUIRE(ledger.Booked().size() == 1);
+  CHECK(ledger.Booked()[0].body == 1);
+}
+
+TEST_CASE("what belongs to nobody goes to the ground with its moment at the finger") {
+  Ledger ledger(kPeriodNs, 4096, 0);
+  const BodyShare share{.body = 2, .force = {2, 0, 0}, .point = {0, 0.2, 0}, .fixed = true};
+  // Half of it was displayed, and 1 N across that nobody wanted.
+  ledger.Book({.displayed = {1, 0, 1}, .wanted = std::span(&share, 1), .finger = Vec3(0.1, 0, 0)});
+  protocol::HapticTick message;
+  ledger.Write(message);
+  CHECK(message.ground.impulse == ImpulseUnits{-1'000'000'000, 0, -1'000'000'000});
+  CHECK(message.ground.angular_impulse == ImpulseUnits{0, 100'000'000, 200'000'000});
+}
+
+TEST_CASE("what was booked in a tick is what the channels grew by") {
+  Ledger ledger(kPeriodNs, 4096, 0);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> any(-1, 1);
+  protocol::HapticTick before;
+  protocol::HapticTick now;
+  for (std::uint32_t body = 1; body <= 3; ++body) REQUIRE(ledger.Open(body, 7, 0, 0));
+  ledger.Write(before);
+  std::int64_t previous_ns = 0;
+  for (int k = 0; k < 300; ++k) {
+    std::vector<BodyShare> shares;
+    Vec3 wanted = Vec3::Zero();
+    for (std::uint32_t body = 1; body <= 3; ++body) {
+      if (any(random) < 0) continue;
+      shares.push_back({.body = body,
+                        .generation = 7,
+                        .force = {any(random), any(random), any(random)},
+                        .point = {any(random), any(random), any(random)}});
+      wanted += shares.back().force;
+    }
+    ledger.Book({.previous_duration_ns = previous_ns, .displayed = 0.8 * wanted, .wanted = shares});
+    previous_ns = kPeriodNs + static_cast<std::int64_t>(4e5 * any(random));
+    ledger.Write(now);
+    std::size_t grown = 0;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const ImpulseUnits growth = Minus(now.channels[i].impulse, before.channels[i].impulse);
+      const ImpulseUnits angular =
+          Minus(now.channels[i].angular_impulse, before.channels[i].angular_impulse);
+      if (growth == ImpulseUnits{}) continue;
+      REQUIRE(grown < ledger.Booked().size());
+      const BodyImpulse& booked = ledger.Booked()[grown++];
+      REQUIRE(booked.body == now.channels[i].body);
+      REQUIRE(booked.generation == 7);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto at = static_cast<Eigen::Index>(axis);
+        REQUIRE(std::llround(booked.impulse[at] * 1e12) == growth[axis]);
+        REQUIRE(std::llround(booked.angular_impulse[at] * 1e12) == angular[axis]);
+      }
+    }
+    REQUIRE(grown == ledger.Booked().size());
+    before = now;
+  }
+}
+
 }  // namespace
 }  // namespace rikiseki::haptic

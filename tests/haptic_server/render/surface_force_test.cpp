@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 #include <random>
 
+#include "haptic_server/render/feature_track.h"
+
 namespace rikiseki::haptic {
 namespace {
 

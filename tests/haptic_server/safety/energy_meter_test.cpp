@@ -119,6 +119,25 @@ TEST_CASE(
   CHECK(wall.meter.times_flagged() == 0);
 }
 
+// A wall that moves against a finger at rest, deeper by `growth` each time, at 4 Hz.
+std::uint64_t FlagsOfOscillatingWall(double growth) {
+  Wall wall(BareDevice(), 2000);
+  double amplitude = 0.002;
+  for (int cycle = 0; cycle < 8; ++cycle, amplitude *= growth) {
+    for (int k = 0; k < 250; ++k) {
+      wall.face = -amplitude * std::sin(2 * M_PI * k / 250.0);
+      wall.Touch(0, 0);
+    }
+  }
+  return wall.meter.times_flagged();
+}
+
+TEST_CASE("bodies that press deeper each time, driven by their coupling, are flagged") {
+  CHECK(FlagsOfOscillatingWall(1.3) == 1);
+  CHECK(FlagsOfOscillatingWall(0.95) == 0);
+  CHECK(FlagsOfOscillatingWall(1) == 0);
+}
+
 TEST_CASE("the flag goes when the buzz is over, and is counted once") {
   Wall wall(BareDevice(), 4000);
   Bouncing mass(0.03, 0.2, -0.002, 0.2);

@@ -357,4 +357,107 @@ TEST_CASE("random bytes do no harm") {
   }
 }
 
+TEST_CASE("message by message is the same in all as what is handed out at once") {
+  std::mt19937_64 random(8);
+  const auto below = [&](std::int64_t n) {
+    return static_cast<std::int64_t>(random() % static_cast<std::uint64_t>(n));
+  };
+  LedgerReader reader = MakeReader(Coupling::kLocal);
+  std::array<std::int64_t, 3> totals{};
+  std::uint64_t tick = 1;
+  std::uint64_t start_ns = 1'000'000'000;
+  const auto send = [&](std::uint64_t ticks) {
+    HapticTick message;
+    for (std::uint64_t i = 0; i < ticks; ++i) {  // all but the last are overwritten unread
+      for (std::size_t body = 0; body < 3; ++body) {
+        if (below(3) > 0) totals[body] += below(2'000'000'000) - 1'000'000'000;
+      }
+      const auto length = static_cast<std::uint64_t>(500'000 + below(1'000'000));
+      start_ns += length;
+      message = Message(tick++, {On(0, totals[0]), On(1, totals[1]), On(2, totals[2])});
+      message.start_ns = start_ns;
+      message.previous_duration_ns = length;
+    }
+    REQUIRE(reader.Consume(message));
+  };
+  send(1);
+  reader.Take();
+  std::uint64_t taken_ns = start_ns;
+  for (int frame = 0; frame < 100; ++frame) {
+    for (std::int64_t i = below(40); i > 0; --i) send(below(10) == 0 ? 7 : 1);
+    std::array<Vec3, 3> impulse;
+    std::array<Vec3, 3> angular;
+    impulse.fill(Vec3::Zero());
+    angular.fill(Vec3::Zero());
+    for (const PendingImpulse& owed : reader.Take()) {
+      impulse[owed.body] = owed.impulse;
+      angular[owed.body] = owed.angular_impulse;
+    }
+    double covered = 0;
+    std::uint64_t ticks = 0;
+    std::size_t end = 0;
+    for (const ReplayTick& part : reader.replay().ticks) {
+      covered += part.length_s;
+      ticks += part.ticks;
+      REQUIRE(part.end >= end);
+      end = part.end;
+    }
+    REQUIRE(end == reader.replay().impulses.size());
+    REQUIRE(covered == Approx(static_cast<double>(start_ns - taken_ns) * 1e-9).margin(1e-12));
+    taken_ns = start_ns;
+    for (const ReplayImpulse& push : reader.replay().impulses) {
+      REQUIRE(push.body < 2);  // body 2 cannot move
+      impulse[push.body] -= push.impulse;
+      angular[push.body] -= push.angular_impulse;
+    }
+    for (std::size_t body = 0; body < 2; ++body) {
+      REQUIRE(impulse[body].norm() < 1e-12);
+      REQUIRE(angular[body].norm() < 1e-12);
+    }
+  }
+}
+
+TEST_CASE("the first moment of a lost block is counted from what was known before it") {
+  LedgerReader reader = MakeReader(Coupling::kLocal);
+  Channel channel = On(0, 4'000'000'000'000);  // 4 N s
+  channel.first_moment = {1.5, 0, 0};
+  reader.Consume(Message(1, {channel}));
+  reader.Take();
+  channel.impulse[0] += 1'000'000'000'000;
+  // 10 ms on the 4 N s that were there, and 3 mN s^2 of the new one.
+  channel.first_moment[0] += 0.01 * 4 + 0.003;
+  HapticTick message = Message(11, {channel});
+  message.start_ns = 10'000'000;
+  message.previous_duration_ns = 1'000'000;
+  reader.Consume(message);
+  reader.Take();
+  REQUIRE(reader.replay().ticks.size() == 1);
+  CHECK(reader.replay().ticks[0].ticks == 10);
+  CHECK(reader.replay().ticks[0].length_s == Approx(0.01));
+  REQUIRE(reader.replay().impulses.size() == 1);
+  CHECK(reader.replay().impulses[0].impulse.x() == Approx(1));
+  CHECK(reader.replay().impulses[0].first_moment.x() == Approx(0.003));
+}
+
+TEST_CASE("only `local` keeps messages apart; what goes with a scene is not replayed") {
+  for (const Coupling coupling : {Coupling::kPosition, Coupling::kImpulse}) {
+    LedgerReader reader = MakeReader(coupling);
+    reader.Consume(Message(1, {On(0, 0)}));
+    reader.Consume(Message(2, {On(0, 100)}));
+    reader.Take();
+    CHECK(reader.replay().ticks.empty());
+    CHECK(reader.replay().impulses.empty());
+  }
+  LedgerReader reader = MakeReader(Coupling::kLocal);
+  reader.Consume(Message(1, {On(0, 0)}));
+  reader.Consume(Message(2, {On(0, 100)}));
+  reader.SetBodies({{2, true}});
+  reader.Take();
+  CHECK(reader.replay().ticks.size() == 2);  // the time passes
+  CHECK(reader.replay().ticks[1].end == 0);
+  CHECK(reader.replay().impulses.empty());
+  reader.Take();
+  CHECK(reader.replay().ticks.empty());
+}
+
 }  // namespace rikiseki::world

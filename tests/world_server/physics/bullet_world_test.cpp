@@ -39,14 +39,13 @@ Mat3 AnyInertia() {
 
 }  // namespace
 
-TEST_CASE("free fall: the velocity is exact, the position g t h / 2 ahead") {
+TEST_CASE("free fall is exact") {
   Scene scene = FreeCube(1);
   scene.gravity = {0, 0, -kGravity};
   BulletWorld world(scene, kSubstep);
   Run(world, 1);
   CHECK(world.State(0).velocity.z() == Approx(-kGravity).epsilon(1e-12));
-  // Semi-implicit Euler: h^2 g N (N + 1) / 2 with N h = 1 s.
-  CHECK(world.State(0).pose.position.z() == Approx(-kGravity / 2 * (1 + kSubstep)).epsilon(1e-12));
+  CHECK(world.State(0).pose.position.z() == Approx(-kGravity / 2).epsilon(1e-12));
 }
 
 TEST_CASE("a kick changes the velocity by exactly J/m and I^-1 L") {
@@ -89,8 +88,7 @@ TEST_CASE("a body with unequal moments spins steadily about its largest axis") {
   CHECK((world.State(0).angular_velocity - Vec3(10, 0, 0)).norm() < 1e-9);
 }
 
-TEST_CASE(
-    "a sliding cube stops v h / 2 short of v^2 / (2 mu g), in every direction, for every step") {
+TEST_CASE("a sliding cube stops after v^2 / (2 mu g), in every direction, for every step") {
   for (const double substep : {1e-3, 5e-3, 10e-3}) {
     for (const double angle : {0.0, 0.4, 0.785398163397448}) {
       BulletWorld world(CubeOnFloor(0.5), substep);
@@ -101,7 +99,10 @@ TEST_CASE(
       const Vec3 way = world.State(1).pose.position - start;
       const double exact = 4 / (2 * 0.5 * kGravity);
       CAPTURE(substep, angle);
-      CHECK(way.head<2>().norm() == Approx(exact - 2 * substep / 2).margin(0.05 * substep));
+      // The substep in which it stops is not moved at all: mu g h^2 / 2 at most.
+      const double short_by = 0.5 * kGravity * substep * substep / 2;
+      CHECK(way.head<2>().norm() < exact + 1e-6);
+      CHECK(way.head<2>().norm() > exact - short_by - 1e-6);
       CHECK(std::abs(way.y() * std::cos(angle) - way.x() * std::sin(angle)) < 1e-6);
       CHECK(world.State(1).velocity.norm() < 1e-9);
     }
