@@ -82,7 +82,7 @@ void Supervise(const Settings& settings, const HapticLoop& loop, protocol::PeerL
     if (signal == SIGINT || signal == SIGTERM) return;
     if (signal == SIGHUP) spdlog::info("SIGHUP: haptic_server takes changed settings at a restart");
     for (const std::string& line : link.PollNews()) spdlog::info("world: {}", line);
-    if (loop.world_mode() != mode) {
+    if (loop.world_mode().period_ns != 0 && loop.world_mode() != mode) {
       mode = loop.world_mode();
       const std::string advice =
           CouplingAdvice(settings.render, mode.coupling, Seconds(mode.period_ns));

@@ -108,14 +108,6 @@ void PrintEnergy(const Json& energy) {
             << ", flagged " << energy["times_flagged"] << " times since the start\n";
 }
 
-// Local bodies; a jump beyond a millimetre says that the copies do not know something.
-void PrintCopies(const Json& reconciliation) {
-  if (reconciliation["frames"] == 0) return;
-  std::cout << "  copies     corrected by " << reconciliation["frames"] << " frames; newest jump "
-            << Number(reconciliation["newest_jump_mm"].get<double>(), 4) << " mm, largest "
-            << Number(reconciliation["largest_jump_mm"].get<double>(), 4) << " mm\n";
-}
-
 void PrintHaptic(const Json& haptic) {
   if (!haptic["attached"].get<bool>()) {
     std::cout << "HAPTIC  not there: " << haptic["why"].get<std::string>() << "\n";

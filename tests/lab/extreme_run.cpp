@@ -17,7 +17,7 @@
 namespace rikiseki::lab {
 namespace {
 
-constexpr double kSlotHalf = 1;       // m, of the boxes on either side of the slot
+constexpr double kSlotHalf = 1e4;  // m, of the boxes on either side of the slot: nothing flies out
 constexpr double kFirstForce = 0.5;   // N, at most, that the finger in the slot starts with
 constexpr double kFirstDepth = 1e-3;  // m, likewise
 constexpr double kSqueeze = 5e-4;     // m, of the prescribed finger

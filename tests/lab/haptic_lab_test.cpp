@@ -120,10 +120,10 @@ TEST_CASE("haptic_lab meets the reference rows") {
   const std::string data = RIKISEKI_SOURCE_DIR "/tests/data/";
   const Ended pokes = Run("fig6 --cases " + data + "fig6_runs_P.csv");
   CHECK(pokes.exit_code == 0);
-  CHECK(Contains(pokes.output, "70 rows: 70 ok 0 missed"));
+  CHECK(Contains(pokes.output, "70 rows: 70 ok 0 missed 0 unstable 0 unsupported"));
   const Ended pushes = Run("fig6 --cases " + data + "fig6_runs_H.csv");
   CHECK(pushes.exit_code == 0);
-  CHECK(Contains(pushes.output, "35 rows: 35 ok 0 missed"));
+  CHECK(Contains(pushes.output, "35 rows: 35 ok 0 missed 0 unstable 0 unsupported"));
 }
 
 TEST_CASE("haptic_lab runs planes, walls and both row formats of multirate") {

@@ -51,10 +51,14 @@ void HapticJudge::FramePublished(std::uint64_t epoch, std::uint64_t number,
   }
   if (epoch != shown_epoch_) {
     shown_.clear();
+    was_shown_.clear();
     shown_epoch_ = epoch;
   }
   for (const Plane& plane : planes) {
     if (poisoned_bodies_.count(plane.body) != 0) return;  // nobody may take this one for shown
+  }
+  for (const Plane& plane : planes) {
+    was_shown_.insert({plane.body, plane.generation, plane.pointer});
   }
   Shown shown{{planes.begin(), planes.end()}, 0};
   const auto before = shown_.find(number - 1);
@@ -302,9 +306,14 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
   if (planes.size() != 1 || shown->second.unchanged < 2 || tick.pointer_count == 0) return;
   if (planes[0].inverse_mass == 0) return;  // ground's
   if (Norm(TotalForce(tick)) < 0.01) return;
+  // One that vanished while it was pressed may fade (6.2, recovery): its own channel grows by that.
   const auto fits = [&](const Channel& channel) {
-    return channel.body == planes[0].body && channel.generation == planes[0].generation &&
-           channel.pointer == planes[0].pointer;
+    const bool is_shown = channel.body == planes[0].body &&
+                          channel.generation == planes[0].generation &&
+                          channel.pointer == planes[0].pointer;
+    return is_shown ||
+           (was_shown_.count({channel.body, channel.generation, channel.pointer}) != 0 &&
+            Largest(GrowthOf(totals_, channel, &Channel::impulse)) > 0);
   };
   const auto end = tick.channels.begin() + tick.channel_count;
   const bool has = std::any_of(tick.channels.begin(), end, fits);

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "protocol/messages.h"
@@ -89,6 +90,7 @@ class HapticJudge {
 
   std::map<std::uint64_t, std::uint64_t> newest_frame_;  // published, by world epoch
   std::map<std::uint64_t, Shown> shown_;                 // by frame number of the newest epoch
+  std::set<std::tuple<std::uint32_t, std::uint32_t, std::uint32_t>> was_shown_;  // of that epoch
   std::uint64_t shown_epoch_ = 0;
   std::uint64_t acked_tick_ = 0;  // the largest honest ack that was published
   bool any_ack_ = false;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <utility>
 #include <vector>
 
 namespace rikiseki::haptic {
@@ -316,6 +317,23 @@ TEST_CASE("a tick of no length kicks and moves nothing; a very long one costs a 
   CHECK(copies.Find(1, 1)->pose.position.z() < 0.051);
 }
 
+TEST_CASE("a tick is divided into no more substeps than eight whole ones of 0.1 ms") {
+  for (const auto& [length_s, substep_s] : {std::pair(1e-3, 1e-4), std::pair(10.0, 10.0 / 80)}) {
+    LocalBodies copies(kPeriodNs, 64, 5, PositionRule::kSemiImplicit);
+    copies.Step(0, {}, kPeriod);
+    protocol::WorldFrame frame = Frame(0);
+    protocol::LocalBody local = Body(1, {});
+    local.acceleration = {0, 0, -9.81};
+    Add(frame, local);
+    frame.local_substep_ns = 1'000;
+    copies.Receive(frame, 1);
+    copies.Step(1, {}, length_s);
+    // The semi-implicit rule tells how long its steps are: g t (t + h) / 2.
+    CHECK(copies.Find(1, 1)->pose.position.z() ==
+          Approx(-9.81 / 2 * length_s * (length_s + substep_s)).epsilon(1e-9));
+  }
+}
+
 TEST_CASE("two copies that touch push each other, and their contact is told once") {
   LocalBodies copies(kPeriodNs, 64, 5, PositionRule::kSecondOrder);
   copies.Step(0, {}, kPeriod);
@@ -364,6 +382,25 @@ TEST_CASE("soft shares pass bit for bit") {
   CHECK(shares[2].force == share(3).force);
   CHECK(shares[3].force == share(1).force);
   CHECK(shares[1].force.norm() < 0.2 * share(2).force.norm());
+}
+
+TEST_CASE("a share is stiff from k T^2/M + 2 d T/M = 1 on") {
+  // 2000 N/m and 2 N s/m at 1 kHz: 6 g.
+  for (const double mass : {0.0059, 0.0061}) {
+    LocalBodies copies(kPeriodNs, 64, 5, PositionRule::kSecondOrder);
+    copies.Step(0, {}, kPeriod);
+    protocol::WorldFrame frame = Frame(0);
+    Add(frame, Body(1, {}, mass));
+    copies.Receive(frame, 1);
+    BodyShare share{.body = 1,
+                    .generation = 1,
+                    .force = {0, 0, 2},
+                    .displacement = {0, 0, 1e-3},
+                    .stiffness = 2000,
+                    .damping = 2};
+    copies.SolveStiff(std::span(&share, 1));
+    CHECK((share.force == Vec3(0, 0, 2)) == (mass > 0.006));
+  }
 }
 
 TEST_CASE("stiff shares are the momentum that the copy gains against the held finger") {
