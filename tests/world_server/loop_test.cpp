@@ -79,6 +79,7 @@ TEST_CASE(
     "a haptic side that dies and is replaced within a world tick is acknowledged to its end") {
   const std::string instance = "test-" + std::to_string(getpid()) + "-loop";
   Settings settings;
+  settings.coupling.coupling = protocol::Coupling::kImpulse;  // which steps in every tick
   const Scene scene = test::FreeCube(1);
   protocol::SegmentOwner owner({.instance = instance,
                                 .role = protocol::Role::kWorld,
