@@ -281,7 +281,8 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
   }
 
   // Channels that went.
-  for (const auto& [key, old] : totals_) {
+  for (const auto& total : totals_) {
+    const auto& key = total.first;
     const auto same = [&](const Channel& channel) { return KeyOf(channel) == key; };
     const auto end = tick.channels.begin() + tick.channel_count;
     if (!consecutive || std::any_of(tick.channels.begin(), end, same)) continue;
