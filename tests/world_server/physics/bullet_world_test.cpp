@@ -194,6 +194,26 @@ TEST_CASE("a stack of five cubes stands") {
   CHECK((world.State(5).pose.position - Vec3(0, 0, 0.225)).norm() < 1e-3);
 }
 
+// Bullet's own routine would see the pair only in the overlap, half a millimetre deep.
+TEST_CASE("a cube that hits another does not enter it, and shares its momentum with it") {
+  for (const double other_kg : {0.05, 0.5, 5.0}) {
+    Scene scene = FreeCube(0.5);
+    scene.bodies.push_back(test::Cube(0.06, other_kg, 0.3, Vec3(0.0702, 0, 0)));
+    BulletWorld world(scene, kSubstep);
+    const Kick kick{.body = 0, .impulse = Vec3(0.5 * 0.6, 0, 0)};  // 0.6 m/s over a gap of 10.2 mm
+    world.ApplyAndStep({&kick, 1}, kSubstep);
+    for (int i = 1; i < 30; ++i) {
+      world.ApplyAndStep({}, kSubstep);
+      const double gap = world.State(1).pose.position.x() - world.State(0).pose.position.x() - 0.06;
+      CAPTURE(other_kg, i);
+      CHECK(gap > -1.05e-5);  // 10.4 um: the depth at which bodies rest in each other
+    }
+    const double shared = 0.5 * 0.6 / (0.5 + other_kg);
+    CHECK(world.State(0).velocity.x() == Approx(shared).epsilon(1e-3));
+    CHECK(world.State(1).velocity.x() == Approx(shared).epsilon(1e-3));
+  }
+}
+
 TEST_CASE("a plane may lean, and a cube slides down it") {
   Scene scene = CubeOnFloor(0.3);
   const Quat lean(Eigen::AngleAxisd(0.5, Vec3::UnitY()));
