@@ -160,7 +160,7 @@ TEST_CASE("SIGUSR1 in contact: no force at once and for good; SIGUSR2 brings it 
   haptic.Signal(SIGUSR1);
   REQUIRE(Is(watch, ForceReason::kEmergencyStop));
   CHECK(Norm(ReadHapticHealth(*view).books.ground) > 0);  // a wall that cannot move is the ground
-  haptic.Signal(SIGTERM);  // stopped, there is nothing to fade
+  haptic.Signal(SIGTERM);                                 // stopped, there is nothing to fade
   CHECK(haptic.Wait() == 0);
 }
 
