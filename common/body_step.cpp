@@ -11,17 +11,11 @@ constexpr int kSweeps = 50;
 constexpr double kSettled = 1e-10;  // m/s
 constexpr double kNoSlip = 1e-9;    // m/s: slower has no direction
 
-// Where an impulse enters a body: its velocity changes by impulse * linear, spin by angular.
+// Where an impulse enters a body; none of them is what does not yield.
 struct Entry {
   double inverse_mass = 0;
   Vec3 arm = Vec3::Zero();
   const Mat3* inverse_inertia = nullptr;  // in W
-
-  double Yield(const Vec3& d) const {
-    if (inverse_inertia == nullptr) return inverse_mass;
-    const Vec3 turning = arm.cross(d);
-    return inverse_mass + turning.dot(*inverse_inertia * turning);
-  }
 };
 
 // One direction of one contact or spring.
@@ -70,6 +64,15 @@ PlaneNow Locate(std::span<const StepBody> bodies, const StepContact& contact) {
   now.point_W = pose_WB * contact.p_B - contact.radius * now.normal_W;
   now.gap = (now.point_W - plane_W).dot(now.normal_W);
   return now;
+}
+
+// The tangential velocity [m/s] of the body's point over the plane.
+Vec3 Slip(std::span<const StepBody> bodies, const StepContact& contact, const PlaneNow& now) {
+  Vec3 slip = bodies[contact.body].state.VelocityAt(now.point_W) - contact.velocity;
+  if (contact.other != StepContact::kSurroundings) {
+    slip -= bodies[contact.other].state.VelocityAt(now.point_W);
+  }
+  return slip - slip.dot(now.normal_W) * now.normal_W;
 }
 
 Row MakeRow(const Entry& body, const Entry& other, const Vec3& direction) {
@@ -124,13 +127,9 @@ double WantedSpeed(double gap, double step_s) {
 Rows MakeRows(const Island& island, const StepContact& contact, double step_s) {
   const PlaneNow now = Locate(island.bodies, contact);
   const Entry body = island.At(contact.body, now.point_W);
-  Entry other;
-  Vec3 slip = island.bodies[contact.body].state.VelocityAt(now.point_W) - contact.velocity;
-  if (contact.other != StepContact::kSurroundings) {
-    other = island.At(contact.other, now.point_W);
-    slip -= island.bodies[contact.other].state.VelocityAt(now.point_W);
-  }
-  slip -= slip.dot(now.normal_W) * now.normal_W;
+  const Entry other =
+      contact.other == StepContact::kSurroundings ? Entry{} : island.At(contact.other, now.point_W);
+  const Vec3 slip = Slip(island.bodies, contact, now);
   const double slip_speed = slip.norm();
   const Vec3 along = slip_speed > kNoSlip ? Vec3(slip / slip_speed) : AcrossTo(now.normal_W);
 
@@ -241,13 +240,12 @@ void StepBodies(std::span<StepBody> bodies, std::span<StepContact> contacts, dou
   mend.fill(Vec3::Zero());
   for (const StepContact& contact : contacts) {
     const PlaneNow now = Locate(bodies, contact);
-    const bool fixed = contact.other == StepContact::kSurroundings;
     if (contact.normal_impulse > 0 && rule == PositionRule::kSecondOrder) {
-      Vec3 slip = bodies[contact.body].state.VelocityAt(now.point_W) - contact.velocity;
-      if (!fixed) slip -= bodies[contact.other].state.VelocityAt(now.point_W);
-      slip -= slip.dot(now.normal_W) * now.normal_W;
-      pushing[contact.body].Add(now.normal_W, slip.norm());
-      if (!fixed) pushing[contact.other].Add(now.normal_W, slip.norm());
+      const double slip_speed = Slip(bodies, contact, now).norm();
+      pushing[contact.body].Add(now.normal_W, slip_speed);
+      if (contact.other != StepContact::kSurroundings) {
+        pushing[contact.other].Add(now.normal_W, slip_speed);
+      }
     }
     if (now.gap <= -kDeepPenetration) {
       Vec3& way = mend[contact.body];
@@ -277,7 +275,8 @@ int SubstepCount(double time_s, double longest_s) noexcept {
 double InverseEffectiveMass(const BodyInertia& inertia, const Pose& pose_WB, const Vec3& point_W,
                             const Vec3& direction) noexcept {
   const Mat3 inverse = inertia.InverseInertia(pose_WB.orientation);
-  return Entry{1 / inertia.mass_kg, point_W - pose_WB.position, &inverse}.Yield(direction);
+  const Entry entry{1 / inertia.mass_kg, point_W - pose_WB.position, &inverse};
+  return MakeRow(entry, Entry{}, direction).yield;
 }
 
 }  // namespace rikiseki

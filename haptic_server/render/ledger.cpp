@@ -12,10 +12,11 @@ namespace {
 constexpr double kUnitsPerNewtonSecond = 1 / protocol::kImpulseUnit;
 constexpr double kLargestUnits = 4e18;  // per call: int64 holds 9.2e18
 
+using protocol::Minus;
+using protocol::Plus;
+
 Vec3 InNewtonSeconds(const protocol::ImpulseUnits& units) {
-  return Vec3(static_cast<double>(units[0]), static_cast<double>(units[1]),
-              static_cast<double>(units[2])) *
-         protocol::kImpulseUnit;
+  return ToVec3(protocol::InSi(units));
 }
 
 // How much of the wanted force was displayed, 0..1.
@@ -27,26 +28,6 @@ double DisplayedFraction(const Vec3& displayed, const Vec3& wanted) {
 }
 
 }  // namespace
-
-protocol::ImpulseUnits Plus(const protocol::ImpulseUnits& a,
-                            const protocol::ImpulseUnits& b) noexcept {
-  protocol::ImpulseUnits sum;
-  for (std::size_t i = 0; i < 3; ++i) {
-    sum[i] = static_cast<std::int64_t>(static_cast<std::uint64_t>(a[i]) +
-                                       static_cast<std::uint64_t>(b[i]));
-  }
-  return sum;
-}
-
-protocol::ImpulseUnits Minus(const protocol::ImpulseUnits& a,
-                             const protocol::ImpulseUnits& b) noexcept {
-  protocol::ImpulseUnits difference;
-  for (std::size_t i = 0; i < 3; ++i) {
-    difference[i] = static_cast<std::int64_t>(static_cast<std::uint64_t>(a[i]) -
-                                              static_cast<std::uint64_t>(b[i]));
-  }
-  return difference;
-}
 
 protocol::ImpulseUnits ImpulseQuantizer::Add(const Vec3& impulse) noexcept {
   protocol::ImpulseUnits units;

@@ -11,15 +11,10 @@
 #include "common/geometry.h"
 #include "haptic_server/render/local_bodies.h"
 #include "haptic_server/render/surface_force.h"
+#include "protocol/impulse_units.h"
 #include "protocol/messages.h"
 
 namespace rikiseki::haptic {
-
-/// Sums of impulse units modulo 2^64, which is defined, unlike the overflow of signed numbers.
-protocol::ImpulseUnits Plus(const protocol::ImpulseUnits& a,
-                            const protocol::ImpulseUnits& b) noexcept;
-protocol::ImpulseUnits Minus(const protocol::ImpulseUnits& a,
-                             const protocol::ImpulseUnits& b) noexcept;
 
 /// Turns a stream of impulses into whole units and carries what is left over.
 class ImpulseQuantizer {

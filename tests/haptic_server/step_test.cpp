@@ -21,7 +21,9 @@ namespace {
 
 using protocol::ForceReason;
 using protocol::ImpulseUnits;
+using protocol::Minus;
 using protocol::PeerState;
+using protocol::Plus;
 
 constexpr std::int64_t kPeriodNs = 1'000'000;
 constexpr std::uint64_t kOwnEpoch = 4242;

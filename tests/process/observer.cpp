@@ -158,10 +158,6 @@ double Norm(const protocol::ImpulseUnits& units) {
                                              static_cast<double>(units[2]));
 }
 
-protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::ImpulseUnits& b) {
-  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
-}
-
 void CheckSafe(const TickWatch& watch) {
   CHECK(watch.lost() == 0);
   CHECK(watch.finite());
@@ -177,9 +173,9 @@ protocol::Books SettledBooks(const protocol::PeerView& haptic, Pushed pushed) {
   };
   CHECK(Eventually([&] {
     books = ReadHapticHealth(haptic).books;
-    return any() && books.displayed == Sum(books.covered, books.peer_lost);
+    return any() && books.displayed == protocol::Plus(books.covered, books.peer_lost);
   }));
-  CHECK(books.covered == Sum(books.applied, books.discarded));
+  CHECK(books.covered == protocol::Plus(books.applied, books.discarded));
   CHECK(any());
   return books;
 }

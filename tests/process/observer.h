@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "protocol/attach.h"
+#include "protocol/impulse_units.h"
 #include "protocol/messages.h"
 
 namespace rikiseki::test {
@@ -74,7 +75,6 @@ protocol::Body ReadMovingBody(const protocol::PeerView& view);
 double Norm(const protocol::Vector& v);
 /// Length of an impulse, N s.
 double Norm(const protocol::ImpulseUnits& units);
-protocol::ImpulseUnits Sum(const protocol::ImpulseUnits& a, const protocol::ImpulseUnits& b);
 
 /// The promises that hold at every tick, whatever happens to the world.
 void CheckSafe(const TickWatch& watch);

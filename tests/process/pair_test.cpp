@@ -178,7 +178,7 @@ TEST_CASE(
       return frame.acked_epoch == haptic_view->epoch() && frame.acked_tick == last.tick;
     }));
     REQUIRE(Eventually([&] { return watch.Latest().tick == last.tick; }));
-    CHECK(Sum(frame.applied, frame.discarded) == watch.Latest().displayed);
+    CHECK(protocol::Plus(frame.applied, frame.discarded) == watch.Latest().displayed);
     CheckSafe(watch);
   }
   const std::uint64_t frames = ReadWorldHealth(*world_view).frames;

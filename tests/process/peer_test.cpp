@@ -68,7 +68,7 @@ TEST_CASE("peer.py world holds haptic_server in contact with its box, and its bo
     const protocol::Books books = SettledBooks(*haptic_view, Pushed::kFixed);
     CHECK(Norm(books.applied) == 0);  // the box cannot move
     CHECK(books.discarded == books.displayed);
-    CHECK(Sum(books.displayed, books.ground)[0] > 0);  // pushed along +x
+    CHECK(protocol::Plus(books.displayed, books.ground)[0] > 0);  // pushed along +x
     CHECK(ReadWorldHealth(*world_view).peer_state == PeerState::kLive);
     CHECK(haptic_view->Counters().rejected == 0);
     CHECK(world_view->Counters().rejected == 0);
@@ -159,7 +159,7 @@ TEST_CASE("peer.py haptic pushes the block of world_server: applied + discarded 
       return frame.acked_epoch == haptic_view->epoch() && frame.acked_tick == last.tick;
     }));
     REQUIRE(Eventually([&] { return watch.Latest().tick == last.tick; }));
-    CHECK(Sum(frame.applied, frame.discarded) == watch.Latest().displayed);
+    CHECK(protocol::Plus(frame.applied, frame.discarded) == watch.Latest().displayed);
     CheckSafe(watch);
   }
   world.Signal(SIGHUP);
@@ -224,7 +224,7 @@ TEST_CASE("a world of a page of C on rikiseki.h holds haptic_server and peer.py 
   REQUIRE(WaitForPush(watch));
   REQUIRE(WaitForRelease(watch));
   const protocol::Books books = SettledBooks(*haptic_view, Pushed::kFixed);
-  CHECK(Norm(Sum(books.displayed, books.ground)) > 0);
+  CHECK(Norm(protocol::Plus(books.displayed, books.ground)) > 0);
   if (python) CHECK(Norm(books.displayed) == 0);  // the box says that it cannot move
   CHECK(Norm(books.applied) == 0);
   CheckSafe(watch);

@@ -12,9 +12,7 @@ namespace {
 using check::Cross;
 using check::Difference;
 using check::Dot;
-using check::Minus;
 using check::Norm;
-using check::Plus;
 using check::Scaled;
 using check::Sum;
 

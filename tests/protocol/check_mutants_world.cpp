@@ -11,8 +11,6 @@ namespace {
 using check::Difference;
 using check::Growth;
 using check::Largest;
-using check::Minus;
-using check::Plus;
 using check::Totals;
 using check::TotalsOf;
 

@@ -35,14 +35,19 @@ Overlap DeepestOverlap(const SceneBody& body, const Pose& pose_WB, const Finger&
 
 }  // namespace
 
+Kick KickAtCentre(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse,
+                  const BodyState& state) {
+  return {.body = body,
+          .impulse = impulse,
+          .angular_impulse = angular_impulse - state.pose.position.cross(impulse)};
+}
+
 std::vector<Kick> ImpulseKicks(std::span<const PendingImpulse> owed,
                                std::span<const BodyState> states) {
   std::vector<Kick> kicks;
   for (const PendingImpulse& pending : owed) {
-    const Vec3& centre = states[pending.body].pose.position;
-    kicks.push_back({.body = pending.body,
-                     .impulse = pending.impulse,
-                     .angular_impulse = pending.angular_impulse - centre.cross(pending.impulse)});
+    kicks.push_back(
+        KickAtCentre(pending.body, pending.impulse, pending.angular_impulse, states[pending.body]));
   }
   return kicks;
 }

@@ -13,8 +13,12 @@
 
 namespace rikiseki::world {
 
-/// `impulse`: one kick per body. The angular impulse is shifted from the world origin to the centre
-/// of mass c where it is now: L_c = L - c x J.
+/// The angular impulse [N m s] is shifted from the world origin to the centre of mass c where it is
+/// now: L_c = L - c x J.
+Kick KickAtCentre(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse,
+                  const BodyState& state);
+
+/// `impulse`: one kick per body, at its present centre.
 std::vector<Kick> ImpulseKicks(std::span<const PendingImpulse> owed,
                                std::span<const BodyState> states);
 

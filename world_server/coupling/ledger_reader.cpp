@@ -4,11 +4,15 @@
 #include <cmath>
 #include <utility>
 
+#include "protocol/impulse_units.h"
+
 namespace rikiseki::world {
 namespace {
 
 using protocol::DiscardReason;
 using protocol::ImpulseUnits;
+using protocol::Minus;
+using protocol::Plus;
 
 // No finger reaches farther from the world origin: bounds hostile angular totals through the gap
 // rule.
@@ -20,22 +24,8 @@ constexpr std::uint64_t kLongestTickNs = 10'000'000'000;
 // What stays within an int64 of impulse units with room to spare, whatever the configuration says.
 constexpr double kLargestCountable = 4e6;  // N s, N m s
 
-std::int64_t Plus(std::int64_t a, std::int64_t b) {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
-}
-std::int64_t Minus(std::int64_t a, std::int64_t b) {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
-}
-ImpulseUnits Plus(const ImpulseUnits& a, const ImpulseUnits& b) {
-  return {Plus(a[0], b[0]), Plus(a[1], b[1]), Plus(a[2], b[2])};
-}
-ImpulseUnits Minus(const ImpulseUnits& a, const ImpulseUnits& b) {
-  return {Minus(a[0], b[0]), Minus(a[1], b[1]), Minus(a[2], b[2])};
-}
 Vec3 InSi(const ImpulseUnits& units) {
-  return Vec3(static_cast<double>(units[0]), static_cast<double>(units[1]),
-              static_cast<double>(units[2])) *
-         protocol::kImpulseUnit;
+  return ToVec3(protocol::InSi(units));
 }
 
 }  // namespace

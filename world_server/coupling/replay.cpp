@@ -5,18 +5,13 @@
 #include <span>
 #include <vector>
 
+#include "world_server/coupling/kick.h"
+
 namespace rikiseki::world {
 namespace {
 
 constexpr double kSameTime = 1e-9;       // relative
 constexpr double kShortestBlock = 1e-4;  // s: bounds what absurd tick numbers cost
-
-Kick AtCentre(const DynamicsWorld& world, std::size_t body, const Vec3& impulse,
-              const Vec3& angular_impulse) {
-  const Vec3 centre = world.State(body).pose.position;
-  return {
-      .body = body, .impulse = impulse, .angular_impulse = angular_impulse - centre.cross(impulse)};
-}
 
 // The share of block i of n of a force that is linear in time, with the given impulse and integral
 // of (end - t) f dt: block by block total/n + slope (i - (n-1)/2). The kick at the start of each
@@ -59,7 +54,8 @@ class Player {
           angular_impulse = ProfileShare(push.angular_impulse, push.angular_first_moment, block_s,
                                          i, blocks, largest_impulse_ns_);
         }
-        kicks_.push_back(AtCentre(world_, push.body, impulse, angular_impulse));
+        kicks_.push_back(
+            KickAtCentre(push.body, impulse, angular_impulse, world_.State(push.body)));
       }
       world_.ApplyAndStep(kicks_, length_s / blocks);
     }

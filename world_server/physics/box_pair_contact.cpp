@@ -11,13 +11,9 @@ namespace {
 // As far as the broad phase finds pairs: nothing slower than 20 m/s closes such a gap in 1 ms.
 constexpr double kReach = 0.02;  // m
 
-Pose FromBullet(const btTransform& pose) {
-  return {world::FromBullet(pose.getOrigin()), world::FromBullet(pose.getRotation()).normalized()};
-}
-
 Box BoxOf(const btCollisionObjectWrapper& object) {
   const auto& shape = *static_cast<const btBoxShape*>(object.getCollisionShape());
-  return {world::FromBullet(shape.getHalfExtentsWithMargin())};
+  return {FromBullet(shape.getHalfExtentsWithMargin())};
 }
 
 class Algorithm final : public btCollisionAlgorithm {

@@ -22,5 +22,8 @@ inline Vec3 FromBullet(const btVector3& v) {
 inline Quat FromBullet(const btQuaternion& q) {
   return {q.w(), q.x(), q.y(), q.z()};
 }
+inline Pose FromBullet(const btTransform& pose) {
+  return {FromBullet(pose.getOrigin()), FromBullet(pose.getRotation()).normalized()};
+}
 
 }  // namespace rikiseki::world

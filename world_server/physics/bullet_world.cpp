@@ -196,8 +196,7 @@ void BulletWorld::Engine::Substep(double step_s) {
 
 BodyState BulletWorld::Engine::State(const Body& body) const {
   const btRigidBody& rigid = *moving[body.moving].rigid;
-  const btTransform& pose = rigid.getWorldTransform();
-  const Pose pose_WP{FromBullet(pose.getOrigin()), FromBullet(pose.getRotation()).normalized()};
+  const Pose pose_WP = FromBullet(rigid.getWorldTransform());
   return {.pose = pose_WP * Pose{.orientation = body.q_BP.conjugate()},
           .velocity = FromBullet(rigid.getLinearVelocity()),
           .angular_velocity = FromBullet(rigid.getAngularVelocity())};

@@ -5,30 +5,6 @@
 #include <string>
 
 namespace rikiseki::protocol::check {
-namespace {
-
-std::int64_t Modulo(std::uint64_t value) {
-  return static_cast<std::int64_t>(value);
-}
-
-}  // namespace
-
-ImpulseUnits Plus(const ImpulseUnits& a, const ImpulseUnits& b) {
-  ImpulseUnits sum{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    sum[i] = Modulo(static_cast<std::uint64_t>(a[i]) + static_cast<std::uint64_t>(b[i]));
-  }
-  return sum;
-}
-
-ImpulseUnits Minus(const ImpulseUnits& a, const ImpulseUnits& b) {
-  ImpulseUnits difference{};
-  for (std::size_t i = 0; i < 3; ++i) {
-    difference[i] = Modulo(static_cast<std::uint64_t>(a[i]) - static_cast<std::uint64_t>(b[i]));
-  }
-  return difference;
-}
-
 std::int64_t Units(double newton_seconds) {
   return static_cast<std::int64_t>(std::llround(newton_seconds / kImpulseUnit));
 }

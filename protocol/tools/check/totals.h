@@ -6,12 +6,11 @@
 #include <string>
 #include <tuple>
 
+#include "protocol/impulse_units.h"
 #include "protocol/messages.h"
 
 namespace rikiseki::protocol::check {
 
-ImpulseUnits Plus(const ImpulseUnits& a, const ImpulseUnits& b);
-ImpulseUnits Minus(const ImpulseUnits& a, const ImpulseUnits& b);
 /// An impulse [N s] in whole units.
 std::int64_t Units(double newton_seconds);
 /// Largest magnitude of an axis, in units.

@@ -8,6 +8,8 @@ namespace rikiseki::haptic {
 namespace {
 
 using protocol::ImpulseUnits;
+using protocol::Minus;
+using protocol::Plus;
 
 constexpr std::int64_t kPeriodNs = 1'000'000;
 
