@@ -96,7 +96,10 @@ void EnergyMeter::WatchPeaks(const EnergySample& sample) noexcept {
     ticks_since_peak_ = 0;
   }
   if (rising_) {
-    highest_ = std::max(highest_, penetration);
+    if (penetration > highest_) {
+      highest_ = penetration;
+      is_cut_ = displayed_fraction_ < 1;
+    }
     if (penetration >= highest_ - threshold) return;
     NotePeak();
     lowest_ = penetration;
@@ -105,18 +108,18 @@ void EnergyMeter::WatchPeaks(const EnergySample& sample) noexcept {
     lowest_ = std::min(lowest_, penetration);
     if (penetration <= lowest_ + threshold) return;
     highest_ = penetration;
+    is_cut_ = displayed_fraction_ < 1;
     rising_ = true;
   }
 }
 
 // From peak to peak the springs have gained what hand and surfaces put in, less what they took back.
 void EnergyMeter::NotePeak() noexcept {
-  const bool is_cut = displayed_fraction_ < 1;
-  const bool grew = last_peak_ > 0 && (highest_ > last_peak_ || (is_cut && was_cut_));
+  const bool grew = last_peak_ > 0 && (highest_ > last_peak_ || (is_cut_ && was_cut_));
   grown_ = grew ? grown_ + 1 : 0;
   grown_by_surface_ = grew && surface_work_ > hand_work_ ? grown_by_surface_ + 1 : 0;
   last_peak_ = highest_;
-  was_cut_ = is_cut;
+  was_cut_ = is_cut_;
   ticks_since_peak_ = 0;
   hand_work_ = surface_work_ = 0;
 }

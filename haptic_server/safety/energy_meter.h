@@ -103,7 +103,8 @@ class EnergyMeter {
   double lowest_ = 0;   // since the last peak
   bool rising_ = true;
   double last_peak_ = 0;
-  bool was_cut_ = false;      // the force of the last peak was
+  bool is_cut_ = false;       // the force at the highest, by the safety stage
+  bool was_cut_ = false;      // likewise at the last peak
   int grown_ = 0;             // peaks in a row that were higher than the one before
   int grown_by_surface_ = 0;  // likewise, into which surfaces put more work than the hand
   double hand_work_ = 0;      // J, on the springs since the last peak
