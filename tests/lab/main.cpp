@@ -8,6 +8,7 @@
 #include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
+#include "tests/lab/buzz.h"
 #include "tests/lab/extremes.h"
 #include "tests/lab/fig6.h"
 #include "tests/lab/multirate.h"
@@ -22,8 +23,8 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Extremes(), Fig6(),   MultirateMasses(), MultirateGrowth(),
-          Planes(),   Pushes(), Slides(),          Wall()};
+  return {Buzz(),   Extremes(), Fig6(), MultirateMasses(), MultirateGrowth(), Planes(),
+          Pushes(), Slides(),   Wall()};
 }
 
 struct Options {
