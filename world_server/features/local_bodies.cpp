@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "world_server/physics/bullet_shapes.h"
+#include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
 namespace {
@@ -65,7 +65,8 @@ class Search {
     double outer = 0;
     for (const Collider& collider : scene_.bodies[body].colliders) {
       if (std::holds_alternative<HalfSpace>(collider.shape)) continue;
-      outer = std::max(outer, collider.pose_BS.position.norm() + OuterRadius(collider.shape));
+      const Ball ball = OuterBall(collider.shape);
+      outer = std::max(outer, (collider.pose_BS * ball.centre).norm() + ball.radius);
     }
     const BodyState& state = states_[body];
     const double speed = state.velocity.norm() + outer * state.angular_velocity.norm();

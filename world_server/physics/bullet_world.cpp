@@ -16,6 +16,7 @@
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_shapes.h"
 #include "world_server/physics/contact_sites.h"
+#include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
 namespace {
@@ -81,7 +82,7 @@ BulletWorld::Engine::Engine(const Scene& scene) {
   for (const SceneBody& body : scene.bodies) {
     if (body.fixed) continue;
     for (const Collider& collider : body.colliders) {
-      smallest = std::min(smallest, 2 * OuterRadius(collider.shape));
+      smallest = std::min(smallest, 2 * OuterBall(collider.shape).radius);
     }
   }
 
@@ -128,6 +129,7 @@ void BulletWorld::Engine::AddMoving(const SceneBody& body) {
   const Pose pose_PB = Pose{.orientation = inertia.orientation}.Inverse();
   for (const Collider& collider : body.colliders) {
     if (std::holds_alternative<HalfSpace>(collider.shape)) refuse("a half-space cannot move");
+    if (std::holds_alternative<Mesh>(collider.shape)) refuse("a mesh that is no hull cannot move");
     if (collider.friction != body.colliders.front().friction) {
       refuse("all shapes of a moving body must have the same friction");
     }
