@@ -121,7 +121,10 @@ bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std
         const Pose pose_WO = states[other].pose * other_collider.pose_BS;
         if (!MayReach(collider, pose_WS, other_collider, pose_WO, reach_m)) continue;
         found.clear();
-        if (!FindNear(collider.shape, pose_WS, other_collider.shape, pose_WO, reach_m, found)) {
+        // A copy's step knows no rebound.
+        const bool bounces = collider.restitution * other_collider.restitution > 0;
+        if (bounces ||
+            !FindNear(collider.shape, pose_WS, other_collider.shape, pose_WO, reach_m, found)) {
           sites.resize(first);
           return false;
         }
