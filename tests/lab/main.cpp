@@ -13,6 +13,7 @@
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/pushes.h"
+#include "tests/lab/scene_cost.h"
 #include "tests/lab/study.h"
 #include "tests/lab/wall.h"
 
@@ -21,7 +22,8 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Extremes(), Fig6(), MultirateMasses(), MultirateGrowth(), Planes(), Pushes(), Wall()};
+  return {Extremes(), Fig6(),   MultirateMasses(), MultirateGrowth(),
+          Planes(),   Pushes(), SceneCost(),       Wall()};
 }
 
 struct Options {
