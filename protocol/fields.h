@@ -1,5 +1,5 @@
 // The one list of what travels, in order: the encoder, the decoder, and the layout fingerprint all
-// walk it, so they cannot disagree. Private to codec.cpp and layout.h; SPEC.md section 6 is the
+// walk it, so they cannot disagree. Private to the codec and layout.h; SPEC.md section 6 is the
 // same as prose.
 //
 // An archive is called as archive(name, value) for integers, enumerators, doubles and arrays of

@@ -103,6 +103,10 @@ HalfSpace FeatureTrack::Interpolated(const Feature& feature) const noexcept {
   const Vec3& base_normal = extrapolate ? feature.last_normal : feature.previous_normal;
   HalfSpace shown;
   shown.point = base_point + s * (feature.last_point - feature.previous_point);
+  if (feature.last_normal == feature.previous_normal) {  // at rest, as without interpolation
+    shown.normal = feature.last_normal;
+    return shown;
+  }
   shown.normal = base_normal + s * (feature.last_normal - feature.previous_normal);
   const double length = shown.normal.norm();
   // Opposite normals meet in zero half-way: the newer one is as good as any, and a unit vector.
