@@ -95,6 +95,8 @@ constexpr std::uint32_t kRecovery =
     Measure<Plane>([](auto& a, auto& m) { PlaneRecoveryFields(a, m); });
 constexpr std::uint32_t kMobility =
     Measure<Plane>([](auto& a, auto& m) { PlaneMobilityFields(a, m); });
+constexpr std::uint32_t kRounding =
+    Measure<Plane>([](auto& a, auto& m) { PlaneRoundingFields(a, m); });
 constexpr std::uint32_t kLocalHead =
     Measure<WorldFrame>([](auto& a, auto& m) { LocalHeadFields(a, m); });
 constexpr std::uint32_t kLocalBody =
@@ -122,7 +124,8 @@ static_assert(kHapticTickBytes == kTickHead + kMaxPointers * (kPointer + kRotati
                                       kMaxChannels * kChannel + kGround);
 static_assert(kWorldFrameBytes ==
               kFrameHead +
-                  kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery + kMobility) +
+                  kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery + kMobility +
+                                kRounding) +
                   kLocalHead + kMaxLocalBodies * (kLocalBody + kMaxContactPlanes * kContactPlane));
 static_assert(kHapticHealthBytes == kHapticHealth + kReconciliation + kEnergy);
 static_assert(WorldSceneBytes(3, 5, 7) ==
@@ -133,10 +136,11 @@ static_assert(WorldBodiesBytes(3) == kBodiesHead + 3 * kBody);
 static_assert(kTickHead % 8 == 0 && kPointer % 8 == 0 && kRotation % 8 == 0 && kChannel % 8 == 0 &&
               kGround % 8 == 0 && kFrameHead % 8 == 0 && kPlane % 8 == 0 && kSurface % 8 == 0 &&
               kBodiesHead % 8 == 0 && kBody % 8 == 0 && kVelocity % 8 == 0 && kFriction % 8 == 0 &&
-              kRecovery % 8 == 0 && kMobility % 8 == 0 && kLocalHead % 8 == 0 &&
-              kLocalBody % 8 == 0 && kContactPlane % 8 == 0 && kHapticHealth % 8 == 0 &&
-              kReconciliation % 8 == 0 && kEnergy % 8 == 0 && kSceneHead % 8 == 0 &&
-              kSceneBody % 8 == 0 && kSceneCollider % 8 == 0 && kSceneMesh % 8 == 0);
+              kRecovery % 8 == 0 && kMobility % 8 == 0 && kRounding % 8 == 0 &&
+              kLocalHead % 8 == 0 && kLocalBody % 8 == 0 && kContactPlane % 8 == 0 &&
+              kHapticHealth % 8 == 0 && kReconciliation % 8 == 0 && kEnergy % 8 == 0 &&
+              kSceneHead % 8 == 0 && kSceneBody % 8 == 0 && kSceneCollider % 8 == 0 &&
+              kSceneMesh % 8 == 0);
 
 // Encode copies contact planes in one piece, since the largest frame has 64 of them.
 static_assert(sizeof(ContactPlane) == kContactPlane && offsetof(ContactPlane, point) == 8 &&
@@ -159,10 +163,12 @@ std::uint32_t FrameBytes(std::uint32_t planes, std::uint32_t blocks) {
          ((blocks & kFrameFriction) != 0 ? planes * kFriction : 0) +
          ((blocks & kFrameRecovery) != 0 ? planes * kRecovery : 0) +
          ((blocks & kFrameMobility) != 0 ? planes * kMobility : 0) +
+         ((blocks & kFrameRounding) != 0 ? planes * kRounding : 0) +
          ((blocks & kFrameLocalBodies) != 0 ? kLocalHead : 0);
 }
 constexpr std::uint32_t kFrameBlocks = kFrameSurfaces | kFrameVelocities | kFrameFriction |
-                                       kFrameRecovery | kFrameLocalBodies | kFrameMobility;
+                                       kFrameRecovery | kFrameLocalBodies | kFrameMobility |
+                                       kFrameRounding;
 
 std::uint32_t HealthBytes(std::uint32_t blocks) {
   return kHapticHealth + ((blocks & kHealthReconciliation) != 0 ? kReconciliation : 0) +
@@ -292,6 +298,7 @@ DecodeStatus DecodeLocalBodies(Decoder& decoder, std::span<const std::uint64_t> 
     if (p.static_friction != 0 || p.dynamic_friction != 0) blocks |= kFrameFriction;
     if (p.recovery_s != 0) blocks |= kFrameRecovery;
     if (p.inverse_mass != kMobilityNotSaid) blocks |= kFrameMobility;
+    if (p.radius != 0) blocks |= kFrameRounding;
   }
   std::uint32_t bytes = FrameBytes(m.plane_count, blocks);
   for (const LocalBody& b : local_bodies) {
@@ -312,6 +319,9 @@ DecodeStatus DecodeLocalBodies(Decoder& decoder, std::span<const std::uint64_t> 
   }
   if ((blocks & kFrameMobility) != 0) {
     for (const Plane& p : planes) PlaneMobilityFields(encoder, p);
+  }
+  if ((blocks & kFrameRounding) != 0) {
+    for (const Plane& p : planes) PlaneRoundingFields(encoder, p);
   }
   return {bytes, blocks};
 }
@@ -336,6 +346,9 @@ DecodeStatus Decode(std::span<const std::uint64_t> words, Encoded encoded,
   }
   if ((encoded.blocks & kFrameMobility) != 0) {
     for (Plane& p : planes) PlaneMobilityFields(decoder, p);
+  }
+  if ((encoded.blocks & kFrameRounding) != 0) {
+    for (Plane& p : planes) PlaneRoundingFields(decoder, p);
   }
   if (!LengthAgrees(words, encoded, bytes, kFrameBlocks)) return DecodeStatus::kLength;
   const DecodeStatus status = Validate(m);

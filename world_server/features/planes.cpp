@@ -87,6 +87,9 @@ std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
                        .recovery_s = collider.recovery_s,
                        .inverse_mass = Mobility(scene.bodies[body], state, point,
                                                 pose_WS.orientation * nearest.normal)};
+        if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
+          found.plane.radius = ball->radius;
+        }
         if (finger.friction > 0 && collider.friction > 0) {
           const double static_friction = collider.static_friction.value_or(collider.friction);
           found.plane.velocity = ToArray(surface_velocity);
