@@ -84,6 +84,7 @@ std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
                        .normal = ToArray(Vec3(pose_WS.orientation * nearest.normal)),
                        .stiffness = collider.stiffness_n_per_m.value_or(0),
                        .damping = collider.damping_ns_per_m.value_or(0),
+                       .velocity = ToArray(surface_velocity),
                        .recovery_s = collider.recovery_s,
                        .inverse_mass = Mobility(scene.bodies[body], state, point,
                                                 pose_WS.orientation * nearest.normal)};
@@ -92,7 +93,6 @@ std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
         }
         if (finger.friction > 0 && collider.friction > 0) {
           const double static_friction = collider.static_friction.value_or(collider.friction);
-          found.plane.velocity = ToArray(surface_velocity);
           found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);
           found.plane.static_friction = std::sqrt(finger.friction * static_friction);
         }
