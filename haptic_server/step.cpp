@@ -94,7 +94,7 @@ struct HapticStep::State {
 
   bool TakeSample(DeviceSample measured, bool clutched) noexcept;
   bool TakeFrame(const WorldInput& world) noexcept;
-  bool WatchWorld(const TickTime& time, const WorldInput& world, double speed) noexcept;
+  bool WatchWorld(const TickTime& time, const WorldInput& world, bool finger_known) noexcept;
   std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
   void Release() noexcept;
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
@@ -129,7 +129,8 @@ struct HapticStep::State {
   std::uint64_t shown_frame = 0;
   std::uint64_t channel_epoch = 0;  // whose bodies the channels are about
   std::uint64_t missed_in_a_row = 0;
-  Vec3 displayed = Vec3::Zero();  // N, in W
+  std::int64_t bounded_period_ns = 0;  // of the world that health.zero_force_after_ns is about
+  Vec3 displayed = Vec3::Zero();       // N, in W
   std::array<HalfSpace, kMaxContactPlanes> planes;
   std::array<BodyShare, kMaxShares> shares;
   protocol::HapticHealth health;
@@ -165,7 +166,7 @@ bool HapticStep::State::TakeFrame(const WorldInput& world) noexcept {
 
 // Peer watch and feature track. True if a frame came that is displayed from now on. // RT:
 bool HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world,
-                                   double speed) noexcept {
+                                   bool finger_known) noexcept {
   const std::int64_t elapsed_ticks = 1 + std::max<std::int64_t>(time.missed, 0);
   const bool fresh = TakeFrame(world);
   const PeerSign sign{
@@ -190,6 +191,7 @@ bool HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
   }
   // A surface as deep as the present contact, or as the finger gets in a tick or two, is no
   // surprise.
+  const double speed = finger_known ? sample.velocity.stableNorm() : 0;
   const double approach = speed * Seconds(period_ns) * static_cast<double>(1 + elapsed_ticks);
   const FingerState finger{sample.position, radius, penetration + approach + 1e-6};
   copies.Receive(*world.frame, tick);
@@ -275,8 +277,11 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
       has_frame
           ? static_cast<std::uint64_t>(std::max<std::int64_t>(peer.frame_age_ns(time.start_ns), 0))
           : 0;
-  health.zero_force_after_ns =
-      static_cast<std::uint64_t>(ZeroForceAfter(settings, peer.world_period_ns()));
+  if (peer.world_period_ns() != bounded_period_ns) {
+    bounded_period_ns = peer.world_period_ns();
+    health.zero_force_after_ns =
+        static_cast<std::uint64_t>(ZeroForceAfter(settings, bounded_period_ns));
+  }
   health.largest_force = std::max(health.largest_force, force.norm());
   health.largest_force_step = std::max(health.largest_force_step, (force - displayed).norm());
   health.target = ToArray(sample.target);
@@ -310,8 +315,7 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
       input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
   if (input.sample_finite) input.speed = measured.velocity.stableNorm();
 
-  const bool is_displayed =
-      state.WatchWorld(time, world, input.sample_finite ? state.sample.velocity.stableNorm() : 0);
+  const bool is_displayed = state.WatchWorld(time, world, input.sample_finite);
 
   const PeerState peer = state.peer.state();
   input.stopped = state.emergency_stop.Update(wish.stop, wish.enable, measured.enabled);

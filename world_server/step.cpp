@@ -16,6 +16,7 @@ struct WorldStep::State {
   Settings settings;
   Scene scene;
   std::unique_ptr<DynamicsWorld> dynamics;
+  std::unique_ptr<PlaneFinder> plane_finder;  // of this scene
   std::vector<BodyState> states;
   std::vector<std::uint32_t> generations;  // may be longer than the scene: numbers are never reused
   LedgerReader ledger;
@@ -46,6 +47,7 @@ void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWor
   }
   scene = new_scene;
   dynamics = std::move(new_dynamics);
+  plane_finder = std::make_unique<PlaneFinder>(scene);
   for (std::uint32_t& generation : generations) ++generation;
   generations.resize(std::max(generations.size(), scene.bodies.size()), 1);
 
@@ -149,7 +151,8 @@ void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   frame.coupling = s.settings.coupling.coupling;
   const FeatureReach reach{.radius_m = s.settings.features.radius_mm * 1e-3,
                            .period_s = static_cast<double>(s.settings.period_ns()) * 1e-9};
-  frame.plane_count = FindPlanes(s.scene, s.states, s.generations, s.fingers, reach, frame.planes);
+  frame.plane_count =
+      s.plane_finder->Find(s.states, s.generations, s.fingers, reach, frame.planes);
   if (s.settings.coupling.coupling == protocol::Coupling::kLocal) {
     frame.local_body_count = FindLocalBodies(s.scene, *s.dynamics, s.states, s.generations,
                                              std::span(frame.planes).first(frame.plane_count),

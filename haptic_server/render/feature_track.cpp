@@ -149,6 +149,7 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
     if (plane.pointer >= fingers.size() || !IsSound(plane)) continue;
     Feature& feature = incoming_[count++];
     feature.identity = plane;
+    feature.identity.velocity = ToArray(WithoutDenormals(ToVec3(plane.velocity)));
     feature.leaving = false;
     feature.last_point = WithoutDenormals(ToVec3(plane.point));
     feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));

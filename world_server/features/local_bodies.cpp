@@ -2,10 +2,13 @@
 
 #include <algorithm>
 
-#include "world_server/physics/bullet_shapes.h"
+#include "world_server/physics/air.h"
+#include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
 namespace {
+
+constexpr double kSteadyAir = 0.2;  // of the speed, in two periods
 
 struct Candidate {
   std::size_t body = 0;
@@ -43,7 +46,7 @@ class Search {
 
   bool AddWithNeighbours(std::size_t body) {
     if (Has(body)) return true;
-    if (found_.size() == room_) return false;
+    if (found_.size() == room_ || Brakes(body)) return false;
     std::vector<ContactSite> sites;
     if (!dynamics_.FindContacts(body, Reach(body), sites)) return false;
     if (sites.size() > protocol::kMaxContactPlanes) return false;
@@ -61,11 +64,20 @@ class Search {
     return true;
   }
 
+  // Whether the air changes too much before the next frame to be told as an acceleration.
+  bool Brakes(std::size_t body) const {
+    const SceneBody& b = scene_.bodies[body];
+    const AirDrag air = AirDrag::On(b);
+    return air.acts() &&
+           air.Rate(BodyInertia::Of(b.mass_kg, b.inertia)) * 2 * reach_.period_s > kSteadyAir;
+  }
+
   double Reach(std::size_t body) const {
     double outer = 0;
     for (const Collider& collider : scene_.bodies[body].colliders) {
       if (std::holds_alternative<HalfSpace>(collider.shape)) continue;
-      outer = std::max(outer, collider.pose_BS.position.norm() + OuterRadius(collider.shape));
+      const Ball ball = OuterBall(collider.shape);
+      outer = std::max(outer, (collider.pose_BS * ball.centre).norm() + ball.radius);
     }
     const BodyState& state = states_[body];
     const double speed = state.velocity.norm() + outer * state.angular_velocity.norm();
@@ -120,7 +132,13 @@ std::uint32_t FindLocalBodies(const Scene& scene, const DynamicsWorld& dynamics,
     local.orientation = ToArray(state.pose.orientation);
     local.velocity = ToArray(state.velocity);
     local.angular_velocity = ToArray(state.angular_velocity);
-    local.acceleration = ToArray(scene.gravity);
+    const Vec3 gravity = body.falls ? scene.gravity : Vec3(Vec3::Zero());
+    local.acceleration = ToArray(gravity);
+    if (const AirDrag air = AirDrag::On(body); air.acts()) {
+      const BodyInertia inertia = BodyInertia::Of(body.mass_kg, body.inertia);
+      local.acceleration = ToArray(Vec3(gravity + air.Acceleration(inertia, state)));
+      local.angular_acceleration = ToArray(air.AngularAcceleration(inertia, state));
+    }
     for (const ContactSite& site : candidate.sites) {
       // A contact of two copies stands with the one of the lower number, unless only the other
       // reaches so far.

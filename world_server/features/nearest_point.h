@@ -1,6 +1,9 @@
-// Signed nearest point and outward normal of the primitive shapes: analytic, exact to rounding, and
-// right inside as well. The paper's shape feature (section 3.1) is the plane through this point.
+// Signed nearest point and outward normal of every shape: analytic and exact to rounding for the
+// primitives, exact per triangle for hulls and meshes, and right inside as well. The paper's shape
+// feature (section 3.1) is the plane through this point.
 #pragma once
+
+#include <vector>
 
 #include "common/geometry.h"
 #include "world_server/scene/scene.h"
@@ -16,5 +19,16 @@ struct NearestPoint {
 
 /// `p` is in the shape's frame and finite.
 NearestPoint FindNearestPoint(const Shape& shape, const Vec3& p);
+
+/// No shape has more features at a time.
+inline constexpr std::size_t kMaxFeatures = 8;
+
+/// All that a point may touch of a shape within `radius` of it [m], nearest first: one nearest point
+/// for a convex shape; of a mesh one for each local minimum of the distance, so that both walls of a
+/// corner are felt, at most kMaxFeatures. Inside a mesh they are those of the nearest surface point,
+/// from outside. None where the shape is farther. Of nearly parallel ones (5 degrees) the nearest.
+/// `found` is emptied first.
+void FindFeatures(const Shape& shape, const Vec3& p, double radius,
+                  std::vector<NearestPoint>& found);
 
 }  // namespace rikiseki::world

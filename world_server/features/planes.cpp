@@ -5,7 +5,6 @@
 #include <tuple>
 
 #include "common/body_step.h"
-#include "world_server/features/nearest_point.h"
 
 namespace rikiseki::world {
 namespace {
@@ -54,51 +53,71 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
   return fingers;
 }
 
-std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
-                         std::span<const std::uint32_t> generations,
-                         std::span<const Finger> fingers, const FeatureReach& reach,
-                         std::span<protocol::Plane> planes) {
+std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
+                                std::span<const std::uint32_t> generations,
+                                std::span<const Finger> fingers, const FeatureReach& reach,
+                                std::span<protocol::Plane> planes) {
   std::vector<Candidate> candidates;
+  std::vector<std::size_t> bodies;
+  std::vector<NearestPoint> features;
+  std::map<TrackKey, FeatureTrack> tracks;
+  const double time_s = 2 * reach.period_s;
   for (const Finger& finger : fingers) {
-    for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
+    // No farther than this from the sphere's centre, whatever turns out to move there.
+    const double finger_reach = finger.radius_m + reach.radius_m + time_s * finger.velocity.norm();
+    near_.Find(states, finger.position, finger_reach, time_s, bodies);
+    for (const std::size_t body : bodies) {
+      const SceneBody& scene_body = scene_.bodies[body];
       const BodyState& state = states[body];
-      for (std::size_t feature = 0; feature < scene.bodies[body].colliders.size(); ++feature) {
-        const Collider& collider = scene.bodies[body].colliders[feature];
+      const double body_way = scene_body.fixed
+                                  ? 0
+                                  : time_s * (state.velocity.norm() +
+                                              state.angular_velocity.norm() * near_.radius_m(body));
+      for (std::size_t place = 0; place < scene_body.colliders.size(); ++place) {
+        const Collider& collider = scene_body.colliders[place];
         const Pose pose_WS = state.pose * collider.pose_BS;
-        const NearestPoint nearest =
-            FindNearestPoint(collider.shape, pose_WS.Inverse() * finger.position);
-        const Vec3 point = pose_WS * nearest.point;
-        const Vec3 surface_velocity =
-            state.velocity + state.angular_velocity.cross(point - state.pose.position);
-        const double speed = (finger.velocity - surface_velocity).norm();
-        const double gap = nearest.distance - finger.radius_m;
-        if (!(gap <= reach.radius_m + 2 * reach.period_s * speed) || !point.allFinite()) continue;
+        const TrackKey key = {finger.pointer, body, place};
+        const auto known = tracks_.find(key);
+        FeatureTrack track = known == tracks_.end() ? FeatureTrack() : std::move(known->second);
+        track.Find(collider.shape, pose_WS.Inverse() * finger.position, finger_reach + body_way,
+                   features);
+        if (features.empty()) continue;
+        const auto slots = track.Number(features, finger_reach + body_way);
+        for (std::size_t i = 0; i < features.size(); ++i) {
+          const Vec3 point = pose_WS * features[i].point;
+          const Vec3 surface_velocity = state.VelocityAt(point);
+          const double speed = (finger.velocity - surface_velocity).norm();
+          const double gap = features[i].distance - finger.radius_m;
+          if (!(gap <= reach.radius_m + time_s * speed) || !point.allFinite()) continue;
 
-        Candidate& found = candidates.emplace_back();
-        found.gap = gap;
-        found.plane = {.pointer = finger.pointer,
-                       .body = static_cast<std::uint32_t>(body),
-                       .generation = generations[body],
-                       .feature = static_cast<std::uint32_t>(feature),
-                       .point = ToArray(point),
-                       .normal = ToArray(Vec3(pose_WS.orientation * nearest.normal)),
-                       .stiffness = collider.stiffness_n_per_m.value_or(0),
-                       .damping = collider.damping_ns_per_m.value_or(0),
-                       .velocity = ToArray(surface_velocity),
-                       .recovery_s = collider.recovery_s,
-                       .inverse_mass = Mobility(scene.bodies[body], state, point,
-                                                pose_WS.orientation * nearest.normal)};
-        if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
-          found.plane.radius = ball->radius;
+          const Vec3 normal = pose_WS.orientation * features[i].normal;
+          Candidate& found = candidates.emplace_back();
+          found.gap = gap;
+          found.plane = {.pointer = finger.pointer,
+                         .body = static_cast<std::uint32_t>(body),
+                         .generation = generations[body],
+                         .feature = FeatureNumber(place, slots[i]),
+                         .point = ToArray(point),
+                         .normal = ToArray(normal),
+                         .stiffness = collider.stiffness_n_per_m.value_or(0),
+                         .damping = collider.damping_ns_per_m.value_or(0),
+                         .velocity = ToArray(surface_velocity),
+                         .recovery_s = collider.recovery_s,
+                         .inverse_mass = Mobility(scene_body, state, point, normal)};
+          if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
+            found.plane.radius = ball->radius;
+          }
+          if (finger.friction > 0 && collider.friction > 0) {
+            const double static_friction = collider.static_friction.value_or(collider.friction);
+            found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);
+            found.plane.static_friction = std::sqrt(finger.friction * static_friction);
+          }
         }
-        if (finger.friction > 0 && collider.friction > 0) {
-          const double static_friction = collider.static_friction.value_or(collider.friction);
-          found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);
-          found.plane.static_friction = std::sqrt(finger.friction * static_friction);
-        }
+        tracks.emplace(key, std::move(track));
       }
     }
   }
+  tracks_ = std::move(tracks);
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.Order() < b.Order(); });
   const std::size_t count = std::min(candidates.size(), planes.size());

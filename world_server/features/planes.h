@@ -1,12 +1,17 @@
 // The planes that the haptic side renders: for every finger and every shape near it the tangent
-// plane at the shape's nearest point, normal towards the finger. Paper 3.1.
+// plane at the shape's nearest point - of a mesh at each near point - normal towards the finger.
+// Paper 3.1.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <vector>
 
 #include "protocol/messages.h"
+#include "world_server/features/feature_track.h"
+#include "world_server/features/near_bodies.h"
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/scene/scene.h"
 
@@ -34,13 +39,33 @@ inline constexpr double kLargestFinger = 1.0;  // m
 /// left out.
 std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction = 0);
 
-/// Fills `planes` nearest first, at most its length, and returns how many. A plane's feature is the
-/// place of its collider within the body. Friction of finger and surface combines as sqrt(mu1 mu2),
-/// the static one with the finger's dynamic one likewise; where there is none, neither it nor the
-/// material's velocity is filled in. `states` and `generations` go with `scene.bodies`.
-std::uint32_t FindPlanes(const Scene& scene, std::span<const BodyState> states,
-                         std::span<const std::uint32_t> generations,
-                         std::span<const Finger> fingers, const FeatureReach& reach,
-                         std::span<protocol::Plane> planes);
+/// What a plane's feature says: the place of its collider within the body, and which of that
+/// collider's surfaces it is, from frame to frame.
+inline std::uint32_t FeatureNumber(std::size_t collider, std::uint32_t slot) {
+  return static_cast<std::uint32_t>(collider) | slot << 16;
+}
+static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1 << 16);
+
+/// Finds the planes of one scene, frame after frame.
+class PlaneFinder {
+ public:
+  /// `scene` outlives this.
+  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+
+  /// Fills `planes` nearest first, at most its length, and returns how many. Friction of finger and
+  /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise; where
+  /// there is none, neither it nor the material's velocity is filled in. `states` and `generations`
+  /// go with the scene's bodies; what cannot move is where the scene says.
+  std::uint32_t Find(std::span<const BodyState> states, std::span<const std::uint32_t> generations,
+                     std::span<const Finger> fingers, const FeatureReach& reach,
+                     std::span<protocol::Plane> planes);
+
+ private:
+  using TrackKey = std::array<std::size_t, 3>;  // pointer, body, collider
+
+  const Scene& scene_;
+  NearBodies near_;
+  std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
+};
 
 }  // namespace rikiseki::world

@@ -51,6 +51,7 @@ void DropStaleContacts(btDiscreteDynamicsWorld& world, double step_s) {
 void BeginSubstep(std::vector<HookedBody>& bodies) {
   for (HookedBody& body : bodies) {
     body.velocity = FromBullet(body.rigid->getLinearVelocity());
+    body.angular_velocity = FromBullet(body.rigid->getAngularVelocity());
     body.orientation = FromBullet(body.rigid->getWorldTransform().getRotation());
   }
 }

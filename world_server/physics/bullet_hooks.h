@@ -22,6 +22,7 @@ struct HookedBody {
 
   // At the start of the substep, the kick included.
   Vec3 velocity = Vec3::Zero();
+  Vec3 angular_velocity = Vec3::Zero();
   Quat orientation = Quat::Identity();
 };
 

@@ -2,9 +2,7 @@
 
 #include <btBulletCollisionCommon.h>
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
+#include <vector>
 
 #include "world_server/physics/bullet_math.h"
 
@@ -47,6 +45,37 @@ class EllipsoidShape final : public btConvexInternalShape {
   btVector3 radii_;
 };
 
+// Bullet's mesh keeps pointers to what it is made of.
+struct MeshData {
+  std::vector<btVector3> corners;
+  std::vector<int> indices;
+  btTriangleIndexVertexArray view;
+
+  explicit MeshData(const TriangleMesh& mesh) {
+    for (const Vec3& corner : mesh.corners()) corners.push_back(ToBullet(corner));
+    for (const TriangleMesh::Face& face : mesh.faces()) {
+      for (const std::uint32_t corner : face.corners) indices.push_back(static_cast<int>(corner));
+    }
+    btIndexedMesh part;
+    part.m_numTriangles = static_cast<int>(mesh.faces().size());
+    part.m_triangleIndexBase = reinterpret_cast<const unsigned char*>(indices.data());
+    part.m_triangleIndexStride = 3 * sizeof(int);
+    part.m_numVertices = static_cast<int>(corners.size());
+    part.m_vertexBase = reinterpret_cast<const unsigned char*>(corners.data());
+    part.m_vertexStride = sizeof(btVector3);
+    part.m_vertexType = PHY_DOUBLE;
+    view.addIndexedMesh(part, PHY_INTEGER);
+  }
+};
+
+class MeshShape final : private MeshData, public btBvhTriangleMeshShape {
+ public:
+  explicit MeshShape(const TriangleMesh& mesh)
+      : MeshData(mesh), btBvhTriangleMeshShape(&view, /*useQuantizedAabbCompression=*/true) {
+    setMargin(0);
+  }
+};
+
 std::unique_ptr<btCollisionShape> Make(const Box& box) {
   return std::make_unique<btBoxShape>(ToBullet(box.half_extents));
 }
@@ -67,45 +96,27 @@ std::unique_ptr<btCollisionShape> Make(const Ellipsoid& ellipsoid) {
   return std::make_unique<EllipsoidShape>(ellipsoid.radii);
 }
 
-template <typename... Functions>
-struct Overloaded : Functions... {
-  using Functions::operator()...;
-};
-
-constexpr double kInfinite = std::numeric_limits<double>::infinity();
+std::unique_ptr<btCollisionShape> Make(const Hull& hull) {
+  auto made = std::make_unique<btConvexHullShape>();
+  for (const Vec3& corner : hull.mesh->corners()) made->addPoint(ToBullet(corner), false);
+  made->recalcLocalAabb();
+  return made;
+}
+std::unique_ptr<btCollisionShape> Make(const Mesh& mesh) {
+  return std::make_unique<MeshShape>(*mesh.mesh);
+}
 
 }  // namespace
 
 std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape) {
   auto made = std::visit([](const auto& given) { return Make(given); }, shape);
-  // The margin of a sphere or capsule is its radius, an ellipsoid has none.
+  // The margin of a sphere or capsule is its radius, an ellipsoid and a mesh have none.
   if (made->getShapeType() == BOX_SHAPE_PROXYTYPE ||
-      made->getShapeType() == CYLINDER_SHAPE_PROXYTYPE) {
+      made->getShapeType() == CYLINDER_SHAPE_PROXYTYPE ||
+      made->getShapeType() == CONVEX_HULL_SHAPE_PROXYTYPE) {
     made->setMargin(kMargin);
   }
   return made;
-}
-
-double InnerRadius(const Shape& shape) {
-  return std::visit(
-      Overloaded{[](const Box& box) { return box.half_extents.minCoeff(); },
-                 [](const Sphere& sphere) { return sphere.radius; },
-                 [](const HalfSpace&) { return kInfinite; },
-                 [](const Cylinder& c) { return std::min(c.radius, c.half_length); },
-                 [](const Capsule& capsule) { return capsule.radius; },
-                 [](const Ellipsoid& ellipsoid) { return ellipsoid.radii.minCoeff(); }},
-      shape);
-}
-
-double OuterRadius(const Shape& shape) {
-  return std::visit(
-      Overloaded{[](const Box& box) { return box.half_extents.norm(); },
-                 [](const Sphere& sphere) { return sphere.radius; },
-                 [](const HalfSpace&) { return kInfinite; },
-                 [](const Cylinder& c) { return std::hypot(c.radius, c.half_length); },
-                 [](const Capsule& capsule) { return capsule.radius + capsule.half_length; },
-                 [](const Ellipsoid& ellipsoid) { return ellipsoid.radii.maxCoeff(); }},
-      shape);
 }
 
 }  // namespace rikiseki::world

@@ -10,13 +10,8 @@
 
 namespace rikiseki::world {
 
-/// In the shape's own frame; a half-space is a plane through the origin.
+/// In the shape's own frame; a half-space is a plane through the origin, a mesh is for bodies that
+/// cannot move. Holds all that it needs of `shape`.
 std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape);
-
-/// Radius of the largest ball inside, about the shape's centre; infinite for a half-space.
-double InnerRadius(const Shape& shape);
-
-/// Radius of the smallest ball about the shape's centre that holds it; infinite for a half-space.
-double OuterRadius(const Shape& shape);
 
 }  // namespace rikiseki::world

@@ -10,12 +10,15 @@
 #include <vector>
 
 #include "common/body_step.h"
+#include "world_server/physics/air.h"
 #include "world_server/physics/box_pair_contact.h"
 #include "world_server/physics/box_plane_contact.h"
 #include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
+#include "world_server/physics/bullet_rebound.h"
 #include "world_server/physics/bullet_shapes.h"
 #include "world_server/physics/contact_sites.h"
+#include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
 namespace {
@@ -45,6 +48,10 @@ struct BulletWorld::Engine {
     std::size_t moving = kFixed;   // its place in `moving`
     Quat q_BP = Quat::Identity();  // principal axes in the body's frame
   };
+  struct Drag {
+    std::size_t moving = 0;
+    AirDrag air;
+  };
 
   // Members are destroyed from the last to the first: the world before what it points to.
   btDefaultCollisionConfiguration configuration;
@@ -58,7 +65,10 @@ struct BulletWorld::Engine {
   btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
   std::vector<Body> bodies;  // in the scene's order
   std::vector<HookedBody> moving;
-  double resting_depth = 0;  // m, how deep bodies rest in each other
+  std::vector<Drag> drags;           // of the bodies on which the air acts
+  std::vector<double> restitutions;  // of rigid_bodies
+  bool bounces = false;              // whether any of them is above 0
+  double resting_depth = 0;          // m, how deep bodies rest in each other
 
   explicit Engine(const Scene& scene);
   ~Engine() {
@@ -67,8 +77,8 @@ struct BulletWorld::Engine {
 
   void AddFixed(const SceneBody& body);
   void AddMoving(const SceneBody& body);
-  btRigidBody* Add(double mass, const Vec3& moments, btCollisionShape* shape, double friction,
-                   const Pose& pose);
+  btRigidBody* Add(double mass, const Vec3& moments, btCollisionShape* shape,
+                   const Collider& surface, const Pose& pose);
   void Apply(const Kick& kick);
   void Substep(double step_s);
   BodyState State(const Body& body) const;
@@ -81,7 +91,7 @@ BulletWorld::Engine::Engine(const Scene& scene) {
   for (const SceneBody& body : scene.bodies) {
     if (body.fixed) continue;
     for (const Collider& collider : body.colliders) {
-      smallest = std::min(smallest, 2 * OuterRadius(collider.shape));
+      smallest = std::min(smallest, 2 * OuterBall(collider.shape).radius);
     }
   }
 
@@ -109,7 +119,7 @@ void BulletWorld::Engine::AddFixed(const SceneBody& body) {
   // friction.
   for (const Collider& collider : body.colliders) {
     shapes.push_back(MakeBulletShape(collider.shape));
-    Add(0, Vec3::Zero(), shapes.back().get(), collider.friction, body.pose_WB * collider.pose_BS);
+    Add(0, Vec3::Zero(), shapes.back().get(), collider, body.pose_WB * collider.pose_BS);
   }
   bodies.emplace_back();
 }
@@ -128,8 +138,12 @@ void BulletWorld::Engine::AddMoving(const SceneBody& body) {
   const Pose pose_PB = Pose{.orientation = inertia.orientation}.Inverse();
   for (const Collider& collider : body.colliders) {
     if (std::holds_alternative<HalfSpace>(collider.shape)) refuse("a half-space cannot move");
+    if (std::holds_alternative<Mesh>(collider.shape)) refuse("a mesh that is no hull cannot move");
     if (collider.friction != body.colliders.front().friction) {
       refuse("all shapes of a moving body must have the same friction");
+    }
+    if (collider.restitution != body.colliders.front().restitution) {
+      refuse("all shapes of a moving body must have the same restitution");
     }
     inner = std::max(inner, InnerRadius(collider.shape));
     shapes.push_back(MakeBulletShape(collider.shape));
@@ -143,28 +157,34 @@ void BulletWorld::Engine::AddMoving(const SceneBody& body) {
   }
 
   const Pose pose_WP = body.pose_WB * Pose{.orientation = inertia.orientation};
-  btRigidBody* rigid =
-      Add(body.mass_kg, inertia.moments, shape, body.colliders.front().friction, pose_WP);
+  btRigidBody* rigid = Add(body.mass_kg, inertia.moments, shape, body.colliders.front(), pose_WP);
   // The defaults (0.8 m/s, 1 rad/s) would put to sleep what a finger moves slowly.
   rigid->setSleepingThresholds(1e-5, 1e-4);
   rigid->setCcdMotionThreshold(inner / 2);
   rigid->setCcdSweptSphereRadius(inner / 2);
   rigid->setFlags(0);  // the hook turns the body, gyroscopic torque included
   rigid->setUserIndex(static_cast<int>(moving.size()));
+  if (!body.falls) rigid->setGravity(btVector3(0, 0, 0));
+  if (const AirDrag air = AirDrag::On(body); air.acts()) {
+    drags.push_back({.moving = moving.size(), .air = air});
+  }
   bodies.push_back({.moving = moving.size(), .q_BP = inertia.orientation});
   moving.push_back({.rigid = rigid,
                     .inertia = BodyInertia::Of(body.mass_kg, Mat3(inertia.moments.asDiagonal()))});
 }
 
 btRigidBody* BulletWorld::Engine::Add(double mass, const Vec3& moments, btCollisionShape* shape,
-                                      double friction, const Pose& pose) {
+                                      const Collider& surface, const Pose& pose) {
   btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, ToBullet(moments));
-  info.m_friction = std::sqrt(friction);  // Bullet multiplies the two
+  info.m_friction = std::sqrt(surface.friction);  // Bullet multiplies the two
   info.m_startWorldTransform = ToBullet(pose);
   rigid_bodies.push_back(std::make_unique<btRigidBody>(info));
   btRigidBody* rigid = rigid_bodies.back().get();
   rigid->setUserIndex(-1);                                // its place among the moving ones
   rigid->setUserIndex2(static_cast<int>(bodies.size()));  // ... and in the scene
+  rigid->setUserIndex3(static_cast<int>(restitutions.size()));
+  restitutions.push_back(surface.restitution);
+  bounces = bounces || surface.restitution > 0;
   world.addRigidBody(rigid);
   return rigid;
 }
@@ -190,8 +210,20 @@ void BulletWorld::Engine::Apply(const Kick& kick) {
 void BulletWorld::Engine::Substep(double step_s) {
   DropStaleContacts(world, step_s);
   BeginSubstep(moving);
+  for (const Drag& drag : drags) {
+    const HookedBody& body = moving[drag.moving];
+    if (!body.rigid->isActive() && drag.air.wind.isZero()) continue;
+    BodyState state{.pose = {.orientation = body.orientation},
+                    .velocity = body.velocity,
+                    .angular_velocity = body.angular_velocity};
+    drag.air.Act(body.inertia, step_s, state);
+    body.rigid->setLinearVelocity(ToBullet(state.velocity));
+    body.rigid->setAngularVelocity(ToBullet(state.angular_velocity));
+    if (!drag.air.wind.isZero()) body.rigid->activate();
+  }
   world.stepSimulation(step_s, 0);
   EndSubstep(world, moving, step_s);
+  if (bounces) Rebound(world, moving, restitutions, step_s);
 }
 
 BodyState BulletWorld::Engine::State(const Body& body) const {

@@ -6,7 +6,7 @@
 #include "common/body_step.h"
 #include "world_server/features/nearest_point.h"
 #include "world_server/physics/box_box_contact.h"
-#include "world_server/physics/bullet_shapes.h"
+#include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
 namespace {
@@ -67,6 +67,7 @@ void BoxNearHalfSpace(const Box& box, const Pose& pose_WS, const HalfSpace& othe
 // False where the pair of shapes is not covered.
 bool FindNear(const Shape& shape, const Pose& pose_WS, const Shape& other, const Pose& pose_WO,
               double reach_m, std::vector<Near>& found) {
+  if (std::holds_alternative<Mesh>(other)) return false;  // the engine meets each triangle alone
   if (const auto* sphere = std::get_if<Sphere>(&shape)) {
     SphereNear(*sphere, pose_WS, other, pose_WO, found);
     return true;
@@ -88,18 +89,19 @@ bool FindNear(const Shape& shape, const Pose& pose_WS, const Shape& other, const
   return true;
 }
 
-double Outer(const Collider& collider) {
-  return std::holds_alternative<HalfSpace>(collider.shape) ? 0 : OuterRadius(collider.shape);
-}
-
-// A lower bound of the distance between two shapes.
+// Whether two shapes may be as near as that; false only where they are not.
 bool MayReach(const Collider& a, const Pose& pose_WA, const Collider& b, const Pose& pose_WB,
               double reach_m) {
-  if (const auto* plane = std::get_if<HalfSpace>(&b.shape)) {
-    const Vec3 normal = pose_WB.orientation * plane->normal;
-    return normal.dot(pose_WA.position - pose_WB.position) <= Outer(a) + reach_m;
+  const Ball ball = OuterBall(a.shape);
+  const Vec3 centre = pose_WA * ball.centre;
+  const double reach = ball.radius + reach_m;
+  const Ball other = OuterBall(b.shape);
+  if ((centre - pose_WB * other.centre).norm() > reach + other.radius) return false;
+  // Of what may be large and hollow the distance itself.
+  if (std::holds_alternative<HalfSpace>(b.shape) || std::holds_alternative<Mesh>(b.shape)) {
+    return FindNearestPoint(b.shape, pose_WB.Inverse() * centre).distance <= reach;
   }
-  return (pose_WA.position - pose_WB.position).norm() <= Outer(a) + Outer(b) + reach_m;
+  return true;
 }
 
 }  // namespace
@@ -119,7 +121,10 @@ bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std
         const Pose pose_WO = states[other].pose * other_collider.pose_BS;
         if (!MayReach(collider, pose_WS, other_collider, pose_WO, reach_m)) continue;
         found.clear();
-        if (!FindNear(collider.shape, pose_WS, other_collider.shape, pose_WO, reach_m, found)) {
+        // A copy's step knows no rebound.
+        const bool bounces = collider.restitution * other_collider.restitution > 0;
+        if (bounces ||
+            !FindNear(collider.shape, pose_WS, other_collider.shape, pose_WO, reach_m, found)) {
           sites.resize(first);
           return false;
         }

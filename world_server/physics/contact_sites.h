@@ -12,9 +12,10 @@
 
 namespace rikiseki::world {
 
-/// Appends the contacts of `body` with a gap of at most `reach_m`, deepest first. Boxes and spheres
-/// against boxes, spheres and half-spaces; false, and nothing appended, if another shape is within
-/// reach or part of the body. `states` go with `scene.bodies`; impulses are left at zero.
+/// Appends the contacts of `body` with a gap of at most `reach_m`, deepest first. Boxes against boxes,
+/// spheres and half-spaces, spheres against everything but meshes; false, and nothing appended, if
+/// another pair, or one that bounces, is within reach. `states` go with `scene.bodies`; impulses are
+/// left at zero.
 bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std::size_t body,
                       double reach_m, std::vector<ContactSite>& sites);
 

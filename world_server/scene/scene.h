@@ -1,12 +1,16 @@
 // A scene as the world runs it: bodies with shapes, masses and surfaces. sdf_loader.h reads it from SDF.
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "common/geometry.h"
+#include "world_server/geometry/triangle_mesh.h"
 
 namespace rikiseki::world {
 
@@ -28,13 +32,28 @@ struct Capsule {
 struct Ellipsoid {
   Vec3 radii = Vec3::Zero();
 };  // m
-using Shape = std::variant<Box, Sphere, HalfSpace, Cylinder, Capsule, Ellipsoid>;
+/// Where triangles came from, for observers.
+struct MeshFile {
+  std::string path;
+  std::array<std::uint8_t, 32> sha256{};  // of its bytes
+  Vec3 scale = Vec3::Ones();
+};
+struct Hull {  // convex and closed
+  std::shared_ptr<const TriangleMesh> mesh;
+  MeshFile file = {};
+};
+struct Mesh {  // any; of bodies that cannot move
+  std::shared_ptr<const TriangleMesh> mesh;
+  MeshFile file = {};
+};
+using Shape = std::variant<Box, Sphere, HalfSpace, Cylinder, Capsule, Ellipsoid, Hull, Mesh>;
 
 /// One collision shape of a body.
 struct Collider {
   Shape shape;
   Pose pose_BS = {};                             // shape in the body's centre-of-mass frame
   double friction = 1;                           // Coulomb; two surfaces combine as sqrt(mu1 mu2)
+  double restitution = 0;                        // 0..1; two surfaces combine as the product
   std::optional<double> stiffness_n_per_m = {};  // rendered, where the scene says so
   std::optional<double> damping_ns_per_m = {};
   std::optional<double> static_friction = {};  // for the finger; none = as `friction`
@@ -47,6 +66,10 @@ struct SceneBody {
   double mass_kg = 0;           // > 0 unless fixed
   Mat3 inertia = Mat3::Zero();  // kg m^2, about the centre of mass, in the body frame
   Pose pose_WB = {};            // of the centre-of-mass frame at the start
+  bool falls = true;            // whether gravity acts on it
+  double drag_ns_per_m = 0;     // of the air: force = drag * (wind - velocity)
+  double angular_drag_nms = 0;  // N m s/rad
+  Vec3 wind = Vec3::Zero();     // m/s, of the air round this body
   std::vector<Collider> colliders = {};
 };
 

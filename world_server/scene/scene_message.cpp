@@ -9,8 +9,9 @@ namespace {
 using protocol::SceneCollider;
 using protocol::ShapeType;
 
-std::array<char, 64> Padded(const std::string& name) {
-  std::array<char, 64> text{};
+template <std::size_t kLength>
+std::array<char, kLength> Padded(const std::string& name) {
+  std::array<char, kLength> text{};
   std::copy_n(name.begin(), std::min(name.size(), text.size() - 1), text.begin());
   return text;
 }
@@ -40,6 +41,23 @@ void Describe(const Ellipsoid& ellipsoid, SceneCollider& c) {
   c.dimensions = ToArray(ellipsoid.radii);
 }
 
+void DescribeMesh(const MeshFile& file, SceneCollider& c) {
+  c.shape = ShapeType::kMesh;
+  c.dimensions = ToArray(file.scale);
+}
+void Describe(const Hull& hull, SceneCollider& c) {
+  DescribeMesh(hull.file, c);
+}
+void Describe(const Mesh& mesh, SceneCollider& c) {
+  DescribeMesh(mesh.file, c);
+}
+
+const MeshFile* FileOf(const Shape& shape) {
+  if (const auto* hull = std::get_if<Hull>(&shape)) return &hull->file;
+  if (const auto* mesh = std::get_if<Mesh>(&shape)) return &mesh->file;
+  return nullptr;
+}
+
 }  // namespace
 
 protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol::Body> bodies,
@@ -47,19 +65,22 @@ protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol:
   protocol::WorldScene message;
   message.revision = revision;
   message.gravity = ToArray(scene.gravity);
-  message.name = Padded(scene.name);
+  message.name = Padded<64>(scene.name);
   bool moving = false;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
     moving = moving || !body.fixed;
     message.bodies.push_back({bodies[i].body, bodies[i].generation, body.fixed ? 1u : 0u,
                               static_cast<std::uint32_t>(body.colliders.size()),
-                              Padded(body.name)});
+                              Padded<64>(body.name)});
     for (const Collider& collider : body.colliders) {
       SceneCollider& c = message.colliders.emplace_back();
       std::visit([&c](const auto& shape) { Describe(shape, c); }, collider.shape);
       c.position = ToArray(collider.pose_BS.position);
       c.orientation = ToArray(collider.pose_BS.orientation);
+      if (const MeshFile* file = FileOf(collider.shape)) {
+        message.meshes.push_back({.sha256 = file->sha256, .path = Padded<224>(file->path)});
+      }
     }
   }
   (moving ? message.needs : message.left_out) |= protocol::kNeedMovingBodies;

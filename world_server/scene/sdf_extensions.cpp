@@ -9,7 +9,7 @@
 #include <string>
 
 #include "common/config.h"
-#include "world_server/scene/sdf_survey.h"
+#include "world_server/scene/sdf_element.h"
 
 namespace rikiseki::world {
 namespace {
@@ -17,10 +17,19 @@ namespace {
 constexpr char kPrefix[] = "rikiseki:";
 constexpr char kStaticFriction[] = "rikiseki:static_friction";
 constexpr char kRecovery[] = "rikiseki:recovery_s";
-constexpr std::array kOfSurface = {kStaticFriction, kRecovery};
+constexpr char kDrag[] = "rikiseki:drag";
+constexpr char kAngularDrag[] = "rikiseki:angular_drag";
+
+struct Place {
+  const char *parent, *of;  // "<parent> of a ..."
+  std::array<const char*, 2> names;
+};
+constexpr std::array kPlaces = {Place{"surface", "collision", {kStaticFriction, kRecovery}},
+                                Place{"link", "model", {kDrag, kAngularDrag}}};
 
 constexpr double kLargestFriction = 100;
 constexpr double kLongestRecovery = 10;  // s, SPEC.md 6.2
+constexpr double kLargestDrag = 1e6;     // N s/m, N m s
 
 // "file:line". libsdformat keeps no line of elements that it does not know: it is sought from the
 // parent's line on, past the elements of this name that come before.
@@ -43,7 +52,7 @@ std::string PlaceOfExtension(const sdf::ElementPtr& element) {
   return PlaceOf(parent);
 }
 
-[[noreturn]] void Refuse(const sdf::ElementPtr& element, const std::string& why) {
+[[noreturn]] void RefuseExtension(const sdf::ElementPtr& element, const std::string& why) {
   throw ConfigError(PlaceOfExtension(element) + ": <" + element->GetName() + "> " + why);
 }
 
@@ -58,18 +67,19 @@ std::string TextOf(const sdf::ElementPtr& element) {
 }
 
 // The number of a child that may stand once; none if it does not stand.
-std::optional<double> ReadNumber(const sdf::ElementPtr& surface, const char* name, double low,
+std::optional<double> ReadNumber(const sdf::ElementPtr& parent, const char* name, double low,
                                  double high, const std::string& expected) {
   std::optional<double> number;
-  for (auto child = surface->GetFirstElement(); child; child = child->GetNextElement()) {
+  for (auto child = parent->GetFirstElement(); child; child = child->GetNextElement()) {
     if (child->GetName() != name) continue;
-    if (number) Refuse(child, "stands twice in this <surface>; once is right");
+    if (number)
+      RefuseExtension(child, "stands twice in this <" + parent->GetName() + ">; once is right");
     const std::string text = TextOf(child);
     char* end = nullptr;
     const double value = std::strtod(text.c_str(), &end);
     const bool is_number = !text.empty() && end == text.c_str() + text.size();
     if (!is_number || !std::isfinite(value) || value < low || value > high) {
-      Refuse(child, "= '" + text + "': " + expected + " is expected");
+      RefuseExtension(child, "= '" + text + "': " + expected + " is expected");
     }
     number = value;
   }
@@ -83,14 +93,15 @@ bool IsExtension(const sdf::ElementPtr& element) {
 }
 
 void CheckExtension(const sdf::ElementPtr& parent, const sdf::ElementPtr& element) {
-  for (const char* name : kOfSurface) {
-    if (element->GetName() == name && parent->GetName() == "surface") return;
-  }
   std::string known;
-  for (const char* name : kOfSurface)
-    known += std::string(known.empty() ? "" : " and ") + "<" + name + ">";
-  Refuse(element, "in <" + parent->GetName() + "> means nothing; " + known +
-                      " in the <surface> of a collision do");
+  for (const Place& place : kPlaces) {
+    for (const char* name : place.names) {
+      if (element->GetName() == name && parent->GetName() == place.parent) return;
+    }
+    known += std::string(known.empty() ? "" : ", ") + "<" + place.names[0] + "> and <" +
+             place.names[1] + "> in the <" + place.parent + "> of a " + place.of;
+  }
+  RefuseExtension(element, "in <" + parent->GetName() + "> means nothing; " + known + " do");
 }
 
 void ReadSurfaceExtensions(const sdf::ElementPtr& collision, Collider& collider) {
@@ -102,6 +113,12 @@ void ReadSurfaceExtensions(const sdf::ElementPtr& collision, Collider& collider)
   collider.recovery_s = ReadNumber(surface, kRecovery, 1e-6, kLongestRecovery,
                                    "a number of seconds above 0, to " + Number(kLongestRecovery))
                             .value_or(0);
+}
+
+void ReadLinkExtensions(const sdf::ElementPtr& link, SceneBody& body) {
+  const std::string expected = "a number from 0 to " + Number(kLargestDrag);
+  body.drag_ns_per_m = ReadNumber(link, kDrag, 0, kLargestDrag, expected).value_or(0);
+  body.angular_drag_nms = ReadNumber(link, kAngularDrag, 0, kLargestDrag, expected).value_or(0);
 }
 
 }  // namespace rikiseki::world

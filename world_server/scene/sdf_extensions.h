@@ -4,6 +4,9 @@
 //   in <surface> of a collision:
 //     <rikiseki:static_friction>  Coulomb, for the finger; from <mu> to 100; absent: as <mu>
 //     <rikiseki:recovery_s>       how long the surface's force takes to come and go, above 0 to 10 s
+//   in <link>:
+//     <rikiseki:drag>          of the air, N s/m, 0 to 1e6: force = drag * (wind - velocity)
+//     <rikiseki:angular_drag>  N m s, 0 to 1e6: torque = -angular_drag * angular velocity
 #pragma once
 
 #include <sdf/Element.hh>
@@ -21,5 +24,8 @@ void CheckExtension(const sdf::ElementPtr& parent, const sdf::ElementPtr& elemen
 /// Fills in what the <surface> of a collision says. Throws ConfigError likewise. The collider's
 /// friction is known.
 void ReadSurfaceExtensions(const sdf::ElementPtr& collision, Collider& collider);
+
+/// Fills in what a <link> says. Throws ConfigError likewise.
+void ReadLinkExtensions(const sdf::ElementPtr& link, SceneBody& body);
 
 }  // namespace rikiseki::world

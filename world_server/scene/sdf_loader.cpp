@@ -13,15 +13,14 @@
 
 #include "common/config.h"
 #include "protocol/messages.h"
+#include "world_server/scene/sdf_element.h"
 #include "world_server/scene/sdf_extensions.h"
+#include "world_server/scene/sdf_mesh.h"
+#include "world_server/scene/sdf_surface.h"
 #include "world_server/scene/sdf_survey.h"
 
 namespace rikiseki::world {
 namespace {
-
-// Stiffer than this no device renders: a file that says 1e12 means "rigid".
-constexpr double kLargestStiffness = 1e6;  // N/m
-constexpr double kLargestDamping = 1e4;    // N s/m
 
 // libsdformat and the URDF parser behind it write to std::cerr what their error objects do not
 // hold. Collects it, so that a refusal stays one line and still gives the reason.
@@ -55,10 +54,6 @@ std::string OneLine(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
   return text;
-}
-
-[[noreturn]] void Refuse(const sdf::ElementPtr& element, const std::string& why) {
-  throw ConfigError(PlaceOf(element) + ": " + why);
 }
 
 // The line of the last element that fits, or 0.
@@ -121,15 +116,6 @@ void RefuseErrors(const std::string& path, const sdf::Root& root, const sdf::Err
   throw ConfigError(place + ": " + why + "; an SDFormat world (sdformat.org) is expected");
 }
 
-Vec3 FromSdf(const ignition::math::Vector3d& v) {
-  return {v.X(), v.Y(), v.Z()};
-}
-
-Pose FromSdf(const ignition::math::Pose3d& pose) {
-  const auto& q = pose.Rot();
-  return {FromSdf(pose.Pos()), Quat(q.W(), q.X(), q.Y(), q.Z()).normalized()};
-}
-
 Pose Resolve(const sdf::SemanticPose& semantic, const sdf::ElementPtr& element) {
   ignition::math::Pose3d pose;
   const sdf::Errors errors = semantic.Resolve(pose);
@@ -138,24 +124,20 @@ Pose Resolve(const sdf::SemanticPose& semantic, const sdf::ElementPtr& element) 
   return FromSdf(pose);
 }
 
-// The element at the end of a path of names, if every one of them stands in the file.
-sdf::ElementPtr FindExplicit(sdf::ElementPtr element, std::initializer_list<const char*> names) {
-  for (const char* name : names) {
-    if (!element->HasElement(name)) return nullptr;
-    element = element->GetElement(name);
-    if (!element->GetExplicitlySetInFile()) return nullptr;
-  }
-  return element;
+// The engine knows one friction and one restitution for a body that moves.
+void RequireSameSurface(const sdf::Collision& collision, const SceneBody& body,
+                        const Collider& collider) {
+  const auto require = [&](double given, double first, const std::string& what) {
+    if (given == first) return;
+    Refuse(collision.Element(),
+           "collision " + collision.Name() + " of link " + body.name + " has another " + what +
+               " than the first; give all collisions of a moving link the same");
+  };
+  require(collider.friction, body.colliders[0].friction, "friction");
+  require(collider.restitution, body.colliders[0].restitution, "restitution");
 }
 
-double Positive(const sdf::ElementPtr& element, const std::string& what, double value) {
-  if (!std::isfinite(value) || !(value > 0)) {
-    Refuse(element, what + " = " + std::to_string(value) + ": a number above 0 is expected");
-  }
-  return value;
-}
-
-Shape ReadShape(const sdf::Collision& collision) {
+Shape ReadPrimitive(const sdf::Collision& collision) {
   const sdf::Geometry& geometry = *collision.Geom();
   const sdf::ElementPtr at = collision.Element()->HasElement("geometry")
                                  ? collision.Element()->GetElement("geometry")
@@ -190,58 +172,8 @@ Shape ReadShape(const sdf::Collision& collision) {
     }
     default:
       Refuse(at,
-             "a collision may be a box, sphere, plane, cylinder, capsule or ellipsoid; meshes, "
-             "heightmaps and the like are not built");
-  }
-}
-
-// SDF's default is 1.
-double ReadFriction(const sdf::ElementPtr& collision) {
-  struct Names {
-    const char *engine, *first, *second;
-  };
-  for (const Names& names : {Names{"ode", "mu", "mu2"}, Names{"bullet", "friction", "friction2"}}) {
-    const auto first = FindExplicit(collision, {"surface", "friction", names.engine, names.first});
-    const auto second =
-        FindExplicit(collision, {"surface", "friction", names.engine, names.second});
-    if (!first && !second) continue;
-    const sdf::ElementPtr& given = first ? first : second;
-    const auto mu = given->Get<double>();
-    if (!std::isfinite(mu) || mu < 0) {
-      Refuse(given, given->GetName() + " = " + std::to_string(mu) + ": 0 or more is expected");
-    }
-    if (first && second && second->Get<double>() != mu) {
-      Refuse(second, std::string(names.second) + " differs from " + names.first +
-                         ": friction that depends on direction is not built; give both the same");
-    }
-    return mu;
-  }
-  return 1;
-}
-
-void ReadCompliance(const sdf::ElementPtr& collision, Collider& collider,
-                    std::vector<std::string>& warnings) {
-  for (const char* engine : {"ode", "bullet"}) {
-    const auto kp = FindExplicit(collision, {"surface", "contact", engine, "kp"});
-    const auto kd = FindExplicit(collision, {"surface", "contact", engine, "kd"});
-    if (!kp) {
-      if (kd) warnings.push_back(PlaceOf(kd) + ": <kd> without <kp> is not used");
-      continue;
-    }
-    const double stiffness = Positive(kp, "kp", kp->Get<double>());
-    if (stiffness > kLargestStiffness) {
-      warnings.push_back(PlaceOf(kp) +
-                         ": <kp> above 1e6 N/m can be rendered by no device; the "
-                         "haptic server's own stiffness is used");
-      return;
-    }
-    const double damping = kd ? kd->Get<double>() : 0;
-    if (!(damping >= 0 && damping <= kLargestDamping)) {
-      Refuse(kd, "kd = " + std::to_string(damping) + ": 0 to 1e4 N s/m is expected");
-    }
-    collider.stiffness_n_per_m = stiffness;
-    collider.damping_ns_per_m = damping;
-    return;
+             "a collision may be a box, sphere, plane, cylinder, capsule, ellipsoid or mesh; "
+             "heightmaps, polylines and the like are not built");
   }
 }
 
@@ -268,9 +200,32 @@ void ReadInertia(const sdf::Link& link, SceneBody& body, std::vector<std::string
   }
 }
 
+// What the link or its model says of the air and of gravity.
+void ReadForces(const sdf::Link& link, const sdf::Model& model, const Vec3& wind, SceneBody& body,
+                std::vector<std::string>& warnings) {
+  const auto gravity = FindExplicit(link.Element(), {"gravity"});
+  body.falls = !gravity || gravity->Get<bool>();
+  ReadLinkExtensions(link.Element(), body);
+  for (const char* name : {"linear", "angular"}) {
+    const auto decay = FindExplicit(link.Element(), {"velocity_decay", name});
+    if (decay && decay->Get<double>() != 0) {
+      Refuse(decay, std::string("<velocity_decay> means another thing in each engine and is not "
+                                "built; <rikiseki:") +
+                        (name[0] == 'l' ? "drag" : "angular_drag") +
+                        "> of the link says it in units");
+    }
+  }
+  if (!model.EnableWind() && !link.EnableWind()) return;
+  body.wind = wind;
+  if (wind.isZero() || body.drag_ns_per_m > 0) return;
+  warnings.push_back(PlaceOf(link.Element()) + ": the wind does not act on link " + body.name +
+                     ", which has no <rikiseki:drag>");
+}
+
 class Loader {
  public:
-  explicit Loader(LoadedScene& loaded) : loaded_(loaded) {}
+  Loader(LoadedScene& loaded, const std::string& folder, const Vec3& wind)
+      : loaded_(loaded), meshes_(folder, loaded.warnings), wind_(wind) {}
 
   void ReadModel(const sdf::Model& model, const std::string& prefix, const Pose& pose_WP,
                  bool in_static) {
@@ -278,7 +233,7 @@ class Loader {
     const bool is_static = in_static || model.Static();
     const Pose pose_WM = pose_WP * Resolve(model.SemanticPose(), model.Element());
     for (std::uint64_t i = 0; i < model.LinkCount(); ++i) {
-      ReadLink(*model.LinkByIndex(i), name, pose_WM, is_static);
+      ReadLink(*model.LinkByIndex(i), model, name, pose_WM, is_static);
     }
     if (!is_static && model.LinkCount() > 1 && !model.SelfCollide()) {
       const auto self_collide = FindExplicit(model.Element(), {"self_collide"});
@@ -296,10 +251,15 @@ class Loader {
   }
 
  private:
-  void ReadLink(const sdf::Link& link, const std::string& model, const Pose& pose_WM,
-                bool is_static) {
+  Shape ReadShape(const sdf::Collision& collision, bool is_static) {
+    const sdf::Mesh* mesh = collision.Geom()->MeshShape();
+    return mesh != nullptr ? meshes_.Read(*mesh, is_static) : ReadPrimitive(collision);
+  }
+
+  void ReadLink(const sdf::Link& link, const sdf::Model& model, const std::string& model_name,
+                const Pose& pose_WM, bool is_static) {
     SceneBody body;
-    body.name = model + "::" + link.Name();
+    body.name = model_name + "::" + link.Name();
     body.fixed = is_static;
     if (link.CollisionCount() == 0) {
       if (is_static) return;  // only for eyes
@@ -312,25 +272,20 @@ class Loader {
     if (!is_static) {
       ReadInertia(link, body, loaded_.warnings);
       pose_LB.position = FromSdf(link.Inertial().Pose().Pos());
+      ReadForces(link, model, wind_, body, loaded_.warnings);
     }
     body.pose_WB = pose_WL * pose_LB;
     for (std::uint64_t i = 0; i < link.CollisionCount(); ++i) {
       const sdf::Collision& collision = *link.CollisionByIndex(i);
       Collider collider;
-      collider.shape = ReadShape(collision);
+      collider.shape = ReadShape(collision, is_static);
       if (!is_static && std::holds_alternative<HalfSpace>(collider.shape)) {
         Refuse(collision.Element(),
                "link " + body.name + " can move and has a plane; planes belong to static models");
       }
       collider.pose_BS = pose_LB.Inverse() * Resolve(collision.SemanticPose(), collision.Element());
-      collider.friction = ReadFriction(collision.Element());
-      if (!is_static && i > 0 && collider.friction != body.colliders[0].friction) {
-        Refuse(collision.Element(), "collision " + collision.Name() + " of link " + body.name +
-                                        " has another friction than the first; give all "
-                                        "collisions of a moving link the same");
-      }
-      ReadCompliance(collision.Element(), collider, loaded_.warnings);
-      ReadSurfaceExtensions(collision.Element(), collider);
+      ReadSurface(collision.Element(), collider, loaded_.warnings);
+      if (!is_static && i > 0) RequireSameSurface(collision, body, collider);
       body.colliders.push_back(collider);
     }
     if (loaded_.scene.bodies.size() == protocol::kMaxBodies) {
@@ -340,6 +295,8 @@ class Loader {
   }
 
   LoadedScene& loaded_;
+  SdfMeshes meshes_;
+  Vec3 wind_;  // m/s
 };
 
 }  // namespace
@@ -376,7 +333,9 @@ LoadedScene LoadSdf(const std::string& path) {
   loaded.scene.name = world.Name();
   loaded.scene.gravity = FromSdf(world.Gravity());
   if (!loaded.scene.gravity.allFinite()) Refuse(world.Element(), "gravity must be finite");
-  Loader loader(loaded);
+  const Vec3 wind = FromSdf(world.WindLinearVelocity());
+  if (!wind.allFinite()) Refuse(world.Element(), "the wind must be finite");
+  Loader loader(loaded, folder, wind);
   for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
     loader.ReadModel(*world.ModelByIndex(i), "", Pose{}, /*in_static=*/false);
   }

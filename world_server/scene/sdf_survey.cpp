@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "common/config.h"
+#include "world_server/scene/sdf_element.h"
 #include "world_server/scene/sdf_extensions.h"
 
 namespace rikiseki::world {
@@ -34,6 +35,8 @@ const std::map<std::string_view, Treatment>& Treatments() {
       {"world/gui", {Use::kLooks}},
       {"world/audio", {Use::kLooks}},
       {"world/spherical_coordinates", {Use::kLooks}},
+      {"world/wind", {}},
+      {"wind/linear_velocity", {}},
       {"world/joint", {Use::kMotion}},
       {"model/static", {}},
       {"model/pose", {}},
@@ -43,7 +46,7 @@ const std::map<std::string_view, Treatment>& Treatments() {
       {"model/include", {Use::kLooks}},
       {"model/self_collide", {}},
       {"model/allow_auto_disable", {Use::kLooks}},
-      {"model/enable_wind", {Use::kDefault, 0}},
+      {"model/enable_wind", {}},
       {"model/joint", {Use::kMotion}},
       {"model/gripper", {Use::kMotion}},
       {"frame/pose", {}},
@@ -57,12 +60,12 @@ const std::map<std::string_view, Treatment>& Treatments() {
       {"link/audio_source", {Use::kLooks}},
       {"link/must_be_base_link", {Use::kLooks}},
       {"link/self_collide", {Use::kLooks}},
-      {"link/gravity", {Use::kDefault, 1}},
+      {"link/gravity", {}},
       {"link/kinematic", {Use::kDefault, 0}},
-      {"link/enable_wind", {Use::kDefault, 0}},
+      {"link/enable_wind", {}},
       {"link/velocity_decay", {}},
-      {"velocity_decay/linear", {Use::kDefault, 0}},
-      {"velocity_decay/angular", {Use::kDefault, 0}},
+      {"velocity_decay/linear", {}},  // the loader refuses other than 0
+      {"velocity_decay/angular", {}},
       {"inertial/mass", {}},
       {"inertial/pose", {}},
       {"inertial/inertia", {}},
@@ -98,8 +101,7 @@ const std::map<std::string_view, Treatment>& Treatments() {
       {"ode/kd", {}},
       {"bullet/kp", {}},
       {"bullet/kd", {}},
-      {"bounce/restitution_coefficient", {Use::kDefault, 0}},
-      {"bounce/threshold", {Use::kLooks}},
+      {"bounce/restitution_coefficient", {}},
   };
   return kTreatments;
 }
@@ -130,7 +132,9 @@ void Survey(const sdf::ElementPtr& parent, bool is_static, std::vector<std::stri
     const auto found = Treatments().find(path);
     if (found == Treatments().end()) {
       const std::string hint =
-          path == "world/physics" ? "; the configuration's physics.substep_ms sets the step" : "";
+          path == "world/physics"      ? "; the configuration's physics.substep_ms sets the step"
+          : path == "bounce/threshold" ? "; what is slower than 2 cm/s does not bounce"
+                                       : "";
       warnings.push_back(PlaceOf(child) + ": " + Tag(child) + " in " + Tag(parent) +
                          " is not used" + hint);
       continue;
@@ -150,11 +154,6 @@ void Survey(const sdf::ElementPtr& parent, bool is_static, std::vector<std::stri
 }
 
 }  // namespace
-
-std::string PlaceOf(const sdf::ElementPtr& element) {
-  if (!element->LineNumber()) return element->FilePath();
-  return element->FilePath() + ":" + std::to_string(*element->LineNumber());
-}
 
 void SurveyWorld(const sdf::ElementPtr& world, std::vector<std::string>& warnings) {
   Survey(world, /*is_static=*/false, warnings);

@@ -8,9 +8,6 @@
 
 namespace rikiseki::world {
 
-/// "file:line", of the file that the element stands in (an included one, perhaps).
-std::string PlaceOf(const sdf::ElementPtr& element);
-
 /// Appends one line for each explicit element below `world` that is not used. Throws ConfigError
 /// for one that would change the motion of bodies.
 void SurveyWorld(const sdf::ElementPtr& world, std::vector<std::string>& warnings);

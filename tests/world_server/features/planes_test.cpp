@@ -24,7 +24,7 @@ Found Find(const Scene& scene, const std::vector<Finger>& fingers, const Feature
     generations.push_back(7);
   }
   Found found;
-  found.count = FindPlanes(scene, states, generations, fingers, reach, found.planes);
+  found.count = PlaneFinder(scene).Find(states, generations, fingers, reach, found.planes);
   return found;
 }
 
@@ -77,7 +77,7 @@ TEST_CASE("the radius grows by the way of two periods at the relative speed") {
   const std::vector<std::uint32_t> generations = {1, 1};
   std::array<protocol::Plane, 4> planes;
   finger = {.radius_m = 0.01, .position = {0.0, 0.03, 0.5}};
-  CHECK(FindPlanes(scene, states, generations, std::vector{finger}, reach, planes) == 1);
+  CHECK(PlaneFinder(scene).Find(states, generations, std::vector{finger}, reach, planes) == 1);
 }
 
 TEST_CASE("friction and the material's velocity are sent where finger and surface have friction") {
@@ -93,7 +93,7 @@ TEST_CASE("friction and the material's velocity are sent where finger and surfac
   Finger finger{.radius_m = 0.01, .position = {-0.04, 0.01, 0.03}};
   const FeatureReach reach{.radius_m = 0.1, .period_s = 0.05};
 
-  REQUIRE(FindPlanes(scene, states, generations, std::vector{finger}, reach, planes) == 2);
+  REQUIRE(PlaneFinder(scene).Find(states, generations, std::vector{finger}, reach, planes) == 2);
   for (int i = 0; i < 2; ++i) {
     CHECK(planes[static_cast<std::size_t>(i)].velocity == protocol::Vector{});
     CHECK(planes[static_cast<std::size_t>(i)].static_friction == 0);
@@ -102,7 +102,7 @@ TEST_CASE("friction and the material's velocity are sent where finger and surfac
   CHECK(planes[0].recovery_s == 0.25);
 
   finger.friction = 0.1;
-  REQUIRE(FindPlanes(scene, states, generations, std::vector{finger}, reach, planes) == 2);
+  REQUIRE(PlaneFinder(scene).Find(states, generations, std::vector{finger}, reach, planes) == 2);
   REQUIRE(planes[0].body == 1);
   CHECK(planes[0].dynamic_friction == Approx(0.2));  // sqrt(0.1 0.4)
   CHECK(planes[0].static_friction == Approx(0.3));   // sqrt(0.1 0.9)
@@ -113,7 +113,7 @@ TEST_CASE("friction and the material's velocity are sent where finger and surfac
   CHECK(planes[1].recovery_s == 0);
 
   scene.bodies[1].colliders[0].static_friction.reset();
-  FindPlanes(scene, states, generations, std::vector{finger}, reach, planes);
+  PlaneFinder(scene).Find(states, generations, std::vector{finger}, reach, planes);
   CHECK(planes[0].static_friction == planes[0].dynamic_friction);
 }
 

@@ -236,9 +236,9 @@ TEST_CASE("a wrong rikiseki element is refused with file, line, name and what wo
   refused(
       "<rikiseki:recovery_s>1</rikiseki:recovery_s>\n<rikiseki:recovery_s>1</rikiseki:recovery_s>",
       "stands twice");
-  refused(
-      "\n<rikiseki:softness>1</rikiseki:softness>",
-      "<rikiseki:static_friction> and <rikiseki:recovery_s> in the <surface> of a collision do");
+  refused("\n<rikiseki:softness>1</rikiseki:softness>",
+          "<rikiseki:static_friction> and <rikiseki:recovery_s> in the <surface> of a collision, "
+          "<rikiseki:drag> and <rikiseki:angular_drag> in the <link> of a model do");
   // Known, but in the wrong place.
   const std::string misplaced = Refusal(
       World("<model name=\"m\"><static>1</static>\n<rikiseki:recovery_s>1</rikiseki:recovery_s>"
@@ -246,6 +246,36 @@ TEST_CASE("a wrong rikiseki element is refused with file, line, name and what wo
             kBox + "</collision></link></model>"));
   CAPTURE(misplaced);
   CHECK(misplaced.starts_with("scene.sdf:4: <rikiseki:recovery_s> in <model> means nothing"));
+}
+
+TEST_CASE("air, wind, gravity and bounce of a link are read") {
+  const auto load = [](const std::string& link, const std::string& world) {
+    return LoadText("<sdf version=\"1.9\" xmlns:rikiseki=\"urn:rikiseki\">\n<world name=\"w\">\n" +
+                    world +
+                    MovingLink(link + "<collision name=\"c\">" + kBox +
+                               "<surface><bounce><restitution_coefficient>0.7"
+                               "</restitution_coefficient></bounce></surface></collision>") +
+                    "</world></sdf>");
+  };
+  const std::string wind = "<wind><linear_velocity>1 2 3</linear_velocity></wind>";
+  const std::string drag =
+      "<rikiseki:drag>0.5</rikiseki:drag><rikiseki:angular_drag>0.01</rikiseki:angular_drag>";
+  const LoadedScene plain = load("", wind);
+  CHECK(plain.warnings.empty());
+  CHECK(plain.scene.bodies[0].falls);
+  CHECK(plain.scene.bodies[0].drag_ns_per_m == 0);
+  CHECK(plain.scene.bodies[0].wind == Vec3::Zero());  // no <enable_wind>
+  CHECK(plain.scene.bodies[0].colliders[0].restitution == 0.7);
+  const LoadedScene all =
+      load(drag + "<enable_wind>true</enable_wind><gravity>false</gravity>", wind);
+  CHECK(all.warnings.empty());
+  CHECK_FALSE(all.scene.bodies[0].falls);
+  CHECK(all.scene.bodies[0].drag_ns_per_m == 0.5);
+  CHECK(all.scene.bodies[0].angular_drag_nms == 0.01);
+  CHECK(all.scene.bodies[0].wind == Vec3(1, 2, 3));
+  const LoadedScene useless = load("<enable_wind>true</enable_wind>", wind);
+  REQUIRE(useless.warnings.size() == 1);
+  CHECK(Contains(useless.warnings[0], "the wind does not act on link m::l"));
 }
 
 TEST_CASE("an included model is found beside the scene") {
@@ -333,11 +363,13 @@ TEST_CASE("refusals: one line with file, line, what is wrong and what would be r
                     "type=\"fixed\"><parent>world</parent><child>l</child></joint></model>")) ==
       "scene.sdf:4: <joint> in <model> would change the motion and is not built; leave it out, or "
       "make the model static");
-  CHECK(Contains(Refusal(World(MovingLink(box + "\n<gravity>false</gravity>"))),
-                 "scene.sdf:5: <gravity>false in <link> would change the motion"));
   CHECK(Contains(
-      Refusal(World(MovingLink("<collision name=\"c\"><geometry><mesh><uri>a.stl</uri></mesh>"
-                               "</geometry></collision>"))),
+      Refusal(World(MovingLink(box + "\n<velocity_decay><linear>0.1</linear></velocity_decay>"))),
+      "scene.sdf:5: <velocity_decay> means another thing in each engine and is not built; "
+      "<rikiseki:drag>"));
+  CHECK(Contains(
+      Refusal(World(MovingLink("<collision name=\"c\"><geometry><heightmap><uri>a.png</uri>"
+                               "</heightmap></geometry></collision>"))),
       "scene.sdf:4: a collision may be a box, sphere, plane"));
   CHECK(Contains(
       Refusal(World(MovingLink("<collision name=\"c\"><geometry><plane/></geometry></collision>"))),

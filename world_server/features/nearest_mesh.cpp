@@ -1,0 +1,272 @@
+#include "world_server/features/nearest_mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace rikiseki::world {
+namespace {
+
+constexpr double kTie = 1e-12;       // of the size: feet as near as this are equally near
+constexpr double kSameFoot = 1e-11;  // of the size
+constexpr double kLift = 1e-8;       // of the size, off the surface
+const double kParallel = std::cos(5 * std::numbers::pi / 180);
+
+// Where a triangle is nearest, and on which part of it: its face, an edge, or a corner.
+struct Foot {
+  enum class Part { kFace, kEdge, kCorner };
+
+  Vec3 point = Vec3::Zero();
+  Part part = Part::kFace;
+  int index = 0;  // of the edge (from corner i to i+1) or the corner
+  std::uint32_t face = 0;
+};
+
+// Regions after C. Ericson, Real-Time Collision Detection, 5.1.5; each foot by its own formula.
+Foot FootOn(const TriangleMesh& mesh, std::uint32_t face, const Vec3& p) {
+  using Part = Foot::Part;
+  const TriangleMesh::Face& triangle = mesh.faces()[face];
+  const Vec3& a = mesh.corners()[triangle.corners[0]];
+  const Vec3& b = mesh.corners()[triangle.corners[1]];
+  const Vec3& c = mesh.corners()[triangle.corners[2]];
+  const Vec3 ab = b - a, ac = c - a, bc = c - b;
+  const Vec3 ap = p - a, bp = p - b, cp = p - c;
+  const double ab_a = ab.dot(ap), ac_a = ac.dot(ap);
+  if (ab_a <= 0 && ac_a <= 0) return {a, Part::kCorner, 0, face};
+  const double ab_b = ab.dot(bp), ac_b = ac.dot(bp);
+  if (ab_b >= 0 && ac_b <= ab_b) return {b, Part::kCorner, 1, face};
+  const double ab_c = ab.dot(cp), ac_c = ac.dot(cp);
+  if (ac_c >= 0 && ab_c <= ac_c) return {c, Part::kCorner, 2, face};
+  const double beyond_ab = ab_a * ac_b - ab_b * ac_a;
+  if (beyond_ab <= 0 && ab_a >= 0 && ab_b <= 0) {
+    return {a + std::clamp(ab_a / ab.squaredNorm(), 0.0, 1.0) * ab, Part::kEdge, 0, face};
+  }
+  const double beyond_ca = ab_c * ac_a - ab_a * ac_c;
+  if (beyond_ca <= 0 && ac_a >= 0 && ac_c <= 0) {
+    return {a + std::clamp(ac_a / ac.squaredNorm(), 0.0, 1.0) * ac, Part::kEdge, 2, face};
+  }
+  const double beyond_bc = ab_b * ac_c - ab_c * ac_b;
+  if (beyond_bc <= 0 && ac_b - ab_b >= 0 && ab_c - ac_c >= 0) {
+    return {b + std::clamp(bc.dot(bp) / bc.squaredNorm(), 0.0, 1.0) * bc, Part::kEdge, 1, face};
+  }
+  return {p - triangle.normal.dot(ap) * triangle.normal, Part::kFace, 0, face};
+}
+
+std::uint32_t CornerOf(const TriangleMesh& mesh, const Foot& foot) {
+  return mesh.faces()[foot.face].corners[static_cast<std::size_t>(foot.index)];
+}
+
+// The angle-weighted normal of the part; its product with p - foot has the sign of the distance.
+Vec3 PartNormal(const TriangleMesh& mesh, const Foot& foot) {
+  switch (foot.part) {
+    case Foot::Part::kEdge:
+      return mesh.EdgeNormal(foot.face, foot.index);
+    case Foot::Part::kCorner:
+      return mesh.corner_normal(CornerOf(mesh, foot));
+    default:
+      return mesh.faces()[foot.face].normal;
+  }
+}
+
+// Beside the border of an open mesh nothing is inside.
+bool OnBorder(const TriangleMesh& mesh, const Foot& foot) {
+  if (foot.part == Foot::Part::kCorner) return mesh.corner_is_open(CornerOf(mesh, foot));
+  return foot.part == Foot::Part::kEdge &&
+         mesh.faces()[foot.face].neighbours[static_cast<std::size_t>(foot.index)] ==
+             TriangleMesh::kNone;
+}
+
+NearestPoint PointAt(const TriangleMesh& mesh, const Foot& foot, const Vec3& p) {
+  NearestPoint nearest;
+  nearest.point = foot.point;
+  nearest.normal = PartNormal(mesh, foot);
+  const Vec3 from_foot = p - foot.point;
+  if (foot.part == Foot::Part::kFace) {
+    const Vec3& corner = mesh.corners()[mesh.faces()[foot.face].corners[0]];
+    nearest.distance = nearest.normal.dot(p - corner);
+    return nearest;
+  }
+  const double length = from_foot.stableNorm();
+  const double side = nearest.normal.dot(from_foot) < 0 && !OnBorder(mesh, foot) ? -1 : 1;
+  nearest.distance = side * length;
+  if (length > kTie * mesh.size()) {
+    nearest.normal = from_foot / nearest.distance;
+  } else {
+    nearest.degenerate = true;
+  }
+  return nearest;
+}
+
+// The nearest foot, and whether another one is as near.
+class Nearest {
+ public:
+  Nearest(const TriangleMesh& mesh, const Vec3& p) : mesh_(mesh), p_(p) { Walk(); }
+
+  const Foot& foot() const { return foot_; }
+  bool tied() const { return tied_; }
+
+ private:
+  struct Visit {
+    std::uint32_t node;
+    double squared_distance;
+  };
+
+  void Walk() {
+    const auto& nodes = mesh_.tree().nodes();
+    std::array<Visit, BoxTree::kDeepest> stack;
+    std::size_t depth = 0;
+    stack[depth++] = {0, nodes[0].bounds.SquaredDistance(p_)};
+    while (depth > 0) {
+      const Visit visit = stack[--depth];
+      if (visit.squared_distance > reach_) continue;
+      const BoxTree::Node& node = nodes[visit.node];
+      if (node.count == 0) {
+        Visit near{node.first, nodes[node.first].bounds.SquaredDistance(p_)};
+        Visit far{node.first + 1, nodes[node.first + 1].bounds.SquaredDistance(p_)};
+        if (far.squared_distance < near.squared_distance) std::swap(near, far);
+        if (far.squared_distance <= reach_) stack[depth++] = far;
+        stack[depth++] = near;
+        continue;
+      }
+      for (std::uint32_t i = 0; i < node.count; ++i) {
+        Look(mesh_.tree().items()[node.first + i]);
+      }
+    }
+  }
+
+  void Look(std::uint32_t face) {
+    const Foot foot = FootOn(mesh_, face, p_);
+    const double distance = (p_ - foot.point).stableNorm();
+    const double tie = kTie * (mesh_.size() + distance);
+    if (distance > distance_ + tie) return;
+    const bool same = (foot.point - foot_.point).norm() <= kSameFoot * mesh_.size();
+    if (distance < distance_ - tie) {
+      tied_ = false;
+    } else if (!same) {
+      tied_ = true;
+    }
+    // Of triangles that share the foot the first one, so that the walk's order does not matter.
+    const bool better = same ? face < foot_.face : distance < distance_;
+    if (!better && distance >= distance_ - tie) return;
+    foot_ = foot;
+    distance_ = distance;
+    reach_ = (distance + 2 * tie) * (distance + 2 * tie);
+  }
+
+  const TriangleMesh& mesh_;
+  const Vec3& p_;
+  Foot foot_;
+  double distance_ = std::numeric_limits<double>::infinity();
+  double reach_ = std::numeric_limits<double>::infinity();  // squared
+  bool tied_ = false;
+};
+
+// Whether the distance from p grows in every direction along the surface, and p sees its outside.
+bool IsMinimum(const TriangleMesh& mesh, const Foot& foot, const Vec3& p) {
+  const Vec3 from_foot = p - foot.point;
+  if (!OnBorder(mesh, foot) && PartNormal(mesh, foot).dot(from_foot) < 0) return false;
+  const double slack = kTie * mesh.size();
+  const TriangleMesh::Face& face = mesh.faces()[foot.face];
+  if (foot.part == Foot::Part::kEdge) {
+    const auto edge = static_cast<std::size_t>(foot.index);
+    if (face.neighbours[edge] == TriangleMesh::kNone) return true;
+    const Vec3 along =
+        mesh.corners()[face.corners[(edge + 1) % 3]] - mesh.corners()[face.corners[edge]];
+    const Vec3 into = -mesh.faces()[face.neighbours[edge]].normal.cross(along).normalized();
+    return from_foot.dot(into) <= slack;
+  }
+  if (foot.part == Foot::Part::kCorner) {
+    const std::uint32_t corner = CornerOf(mesh, foot);
+    for (const std::uint32_t touching : mesh.FacesAt(corner)) {
+      for (const std::uint32_t other : mesh.faces()[touching].corners) {
+        const Vec3 along = mesh.corners()[other] - foot.point;
+        if (other != corner && from_foot.dot(along) > slack * along.norm()) return false;
+      }
+    }
+  }
+  return true;
+}
+
+// Whether the normals of a node's surface can point at p: else no minimum is in it. After D. Johnson
+// and E. Cohen, "Spatialized normal cone hierarchies", 2001.
+bool MayFace(const TriangleMesh& mesh, std::uint32_t node, const Vec3& p) {
+  const TriangleMesh::NormalCone& cone = mesh.cone(node);
+  if (cone.half_angle >= std::numbers::pi) return true;
+  const Bounds& bounds = mesh.tree().nodes()[node].bounds;
+  const Vec3 towards = p - (bounds.low + bounds.high) / 2;
+  const double radius = (bounds.high - bounds.low).norm() / 2;
+  const double distance = towards.norm();
+  if (distance <= radius) return true;
+  const double spread = cone.half_angle + std::asin(radius / distance) + 1e-6;
+  return spread >= std::numbers::pi || cone.axis.dot(towards) >= distance * std::cos(spread);
+}
+
+void FindMinima(const TriangleMesh& mesh, const Vec3& p, double radius,
+                std::vector<NearestPoint>& minima) {
+  const auto& nodes = mesh.tree().nodes();
+  std::array<std::uint32_t, BoxTree::kDeepest> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const std::uint32_t number = stack[--depth];
+    const BoxTree::Node& node = nodes[number];
+    if (node.bounds.SquaredDistance(p) > radius * radius || !MayFace(mesh, number, p)) continue;
+    if (node.count == 0) {
+      stack[depth++] = node.first + 1;
+      stack[depth++] = node.first;
+      continue;
+    }
+    for (std::uint32_t i = 0; i < node.count; ++i) {
+      const Foot foot = FootOn(mesh, mesh.tree().items()[node.first + i], p);
+      if (!IsMinimum(mesh, foot, p)) continue;
+      const NearestPoint minimum = PointAt(mesh, foot, p);
+      if (minimum.distance <= radius) minima.push_back(minimum);
+    }
+  }
+  std::stable_sort(minima.begin(), minima.end(), [](const NearestPoint& a, const NearestPoint& b) {
+    return a.distance < b.distance;
+  });
+}
+
+}  // namespace
+
+NearestPoint FindNearest(const TriangleMesh& mesh, const Vec3& p) {
+  const Nearest found(mesh, p);
+  NearestPoint nearest = PointAt(mesh, found.foot(), p);
+  nearest.degenerate = nearest.degenerate || found.tied();
+  return nearest;
+}
+
+void FindMeshFeatures(const TriangleMesh& mesh, const Vec3& p, double radius,
+                      std::vector<NearestPoint>& found) {
+  found.clear();
+  const NearestPoint nearest = FindNearest(mesh, p);
+  if (!(nearest.distance <= radius)) return;
+  if (!mesh.flaws().closed() && nearest.distance < -radius) return;
+  // From inside, what is felt is what a finger on the surface would feel: at the inner side of a
+  // corner both walls, where the nearest point alone is the corner's edge.
+  const bool inside = nearest.distance < 0;
+  const Vec3 from = inside ? Vec3(nearest.point + kLift * mesh.size() * nearest.normal) : p;
+  std::vector<NearestPoint> minima;
+  FindMinima(mesh, from, radius, minima);
+  if (!inside || minima.empty()) minima.insert(minima.begin(), nearest);
+  for (NearestPoint& minimum : minima) {
+    const bool known = std::any_of(found.begin(), found.end(), [&](const NearestPoint& nearer) {
+      return nearer.normal.dot(minimum.normal) > kParallel ||
+             (nearer.point - minimum.point).norm() <= kSameFoot * mesh.size();
+    });
+    if (known) continue;
+    found.push_back(minimum);
+    if (found.size() == kMaxFeatures) break;
+  }
+  if (!inside) return;
+  for (NearestPoint& feature : found) {
+    feature.distance = feature.normal.dot(p - feature.point);
+    feature.point = p - feature.distance * feature.normal;
+    feature.degenerate = nearest.degenerate;
+  }
+}
+
+}  // namespace rikiseki::world
