@@ -21,6 +21,8 @@ constexpr std::uint32_t kRecovery =
     Measure<Plane>([](auto& a, auto& m) { PlaneRecoveryFields(a, m); });
 constexpr std::uint32_t kMobility =
     Measure<Plane>([](auto& a, auto& m) { PlaneMobilityFields(a, m); });
+constexpr std::uint32_t kRounding =
+    Measure<Plane>([](auto& a, auto& m) { PlaneRoundingFields(a, m); });
 constexpr std::uint32_t kLocalHead =
     Measure<WorldFrame>([](auto& a, auto& m) { LocalHeadFields(a, m); });
 constexpr std::uint32_t kLocalBody =
@@ -30,13 +32,15 @@ constexpr std::uint32_t kContactPlane =
 
 static_assert(kWorldFrameBytes ==
               kFrameHead +
-                  kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery + kMobility) +
+                  kMaxPlanes * (kPlane + kSurface + kVelocity + kFriction + kRecovery + kMobility +
+                                kRounding) +
                   kLocalHead + kMaxLocalBodies * (kLocalBody + kMaxContactPlanes * kContactPlane));
 static_assert(kWorldHealthBytes ==
               Measure<WorldHealth>([](auto& a, auto& m) { WorldHealthFields(a, m); }));
 static_assert(kFrameHead % 8 == 0 && kPlane % 8 == 0 && kSurface % 8 == 0 && kVelocity % 8 == 0 &&
               kFriction % 8 == 0 && kRecovery % 8 == 0 && kMobility % 8 == 0 &&
-              kLocalHead % 8 == 0 && kLocalBody % 8 == 0 && kContactPlane % 8 == 0);
+              kRounding % 8 == 0 && kLocalHead % 8 == 0 && kLocalBody % 8 == 0 &&
+              kContactPlane % 8 == 0);
 
 // Encode copies contact planes in one piece, since the largest frame has 64 of them.
 static_assert(sizeof(ContactPlane) == kContactPlane && offsetof(ContactPlane, point) == 8 &&
@@ -53,10 +57,12 @@ std::uint32_t FrameBytes(std::uint32_t planes, std::uint32_t blocks) {
          ((blocks & kFrameFriction) != 0 ? planes * kFriction : 0) +
          ((blocks & kFrameRecovery) != 0 ? planes * kRecovery : 0) +
          ((blocks & kFrameMobility) != 0 ? planes * kMobility : 0) +
+         ((blocks & kFrameRounding) != 0 ? planes * kRounding : 0) +
          ((blocks & kFrameLocalBodies) != 0 ? kLocalHead : 0);
 }
 constexpr std::uint32_t kFrameBlocks = kFrameSurfaces | kFrameVelocities | kFrameFriction |
-                                       kFrameRecovery | kFrameLocalBodies | kFrameMobility;
+                                       kFrameRecovery | kFrameLocalBodies | kFrameMobility |
+                                       kFrameRounding;
 
 /// The blocks with one record for each plane, in the order of their bits.
 template <typename Archive, typename Planes>
@@ -111,6 +117,7 @@ DecodeStatus DecodeLocalBodies(Decoder& decoder, std::span<const std::uint64_t> 
     if (p.static_friction != 0 || p.dynamic_friction != 0) blocks |= kFrameFriction;
     if (p.recovery_s != 0) blocks |= kFrameRecovery;
     if (p.inverse_mass != kMobilityNotSaid) blocks |= kFrameMobility;
+    if (p.radius != 0) blocks |= kFrameRounding;
   }
   std::uint32_t bytes = FrameBytes(m.plane_count, blocks);
   for (const LocalBody& b : local_bodies) {
@@ -131,6 +138,9 @@ DecodeStatus DecodeLocalBodies(Decoder& decoder, std::span<const std::uint64_t> 
   }
   if ((blocks & kFrameMobility) != 0) {
     for (const Plane& p : planes) PlaneMobilityFields(encoder, p);
+  }
+  if ((blocks & kFrameRounding) != 0) {
+    for (const Plane& p : planes) PlaneRoundingFields(encoder, p);
   }
   return {bytes, blocks};
 }
@@ -155,6 +165,9 @@ DecodeStatus Decode(std::span<const std::uint64_t> words, Encoded encoded,
   }
   if ((encoded.blocks & kFrameMobility) != 0) {
     for (Plane& p : planes) PlaneMobilityFields(decoder, p);
+  }
+  if ((encoded.blocks & kFrameRounding) != 0) {
+    for (Plane& p : planes) PlaneRoundingFields(decoder, p);
   }
   if (!LengthAgrees(words, encoded, bytes, kFrameBlocks)) return DecodeStatus::kLength;
   const DecodeStatus status = Validate(m);

@@ -113,6 +113,11 @@ constexpr void PlaneMobilityFields(Archive& archive, P& p) {
   archive("inverse_mass", p.inverse_mass);
 }
 
+template <typename Archive, typename P>
+constexpr void PlaneRoundingFields(Archive& archive, P& p) {
+  archive("radius", p.radius);
+}
+
 template <typename Archive, typename Message>
 constexpr void LocalHeadFields(Archive& archive, Message& m) {
   archive("local_body_count", m.local_body_count);
