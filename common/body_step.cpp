@@ -18,18 +18,19 @@ struct Entry {
   const Mat3* inverse_inertia = nullptr;  // in W
 };
 
-// One direction of one contact or spring.
+// One direction of one contact or spring. Without initial values: a step has room for many and uses
+// few.
 struct Row {
   Vec3 direction;
   Vec3 turn_body, turn_other;  // arm x direction
   Vec3 spin_body, spin_other;  // I^-1 (arm x direction)
-  double yield = 0;            // m/s per N s
+  double yield;                // m/s per N s
 };
 
 struct Rows {
-  Row normal, slip_1, slip_2;
-  double bounce = 0;  // m/s, that the normal velocity must reach
-  double impulse_1 = 0, impulse_2 = 0;
+  Row normal, slip_1, slip_2;  // the latter two only where there is friction
+  double bounce;               // m/s, that the normal velocity must reach
+  double impulse_1, impulse_2;
 };
 
 struct Island {
@@ -96,7 +97,7 @@ Vec3 AcrossTo(const Vec3& normal) {
 }
 
 // The relative velocity along a row.
-double Speed(std::span<const StepBody> bodies, const StepContact& contact, const Row& row) {
+inline double Speed(std::span<const StepBody> bodies, const StepContact& contact, const Row& row) {
   const BodyState& a = bodies[contact.body].state;
   double speed = a.velocity.dot(row.direction) + a.angular_velocity.dot(row.turn_body);
   if (contact.other == StepContact::kSurroundings) {
@@ -108,7 +109,8 @@ double Speed(std::span<const StepBody> bodies, const StepContact& contact, const
   return speed;
 }
 
-void Push(std::span<StepBody> bodies, const StepContact& contact, const Row& row, double impulse) {
+inline void Push(std::span<StepBody> bodies, const StepContact& contact, const Row& row,
+                 double impulse) {
   StepBody& a = bodies[contact.body];
   a.state.velocity += impulse / a.inertia.mass_kg * row.direction;
   a.state.angular_velocity += impulse * row.spin_body;
@@ -124,7 +126,7 @@ double WantedSpeed(double gap, double step_s) {
   return gap > -kDeepPenetration ? -kPenetrationRecovery * gap / step_s : 0;
 }
 
-Rows MakeRows(const Island& island, const StepContact& contact, double step_s) {
+void MakeRows(const Island& island, const StepContact& contact, double step_s, Rows& rows) {
   const PlaneNow now = Locate(island.bodies, contact);
   const Entry body = island.At(contact.body, now.point_W);
   const Entry other =
@@ -133,14 +135,13 @@ Rows MakeRows(const Island& island, const StepContact& contact, double step_s) {
   const double slip_speed = slip.norm();
   const Vec3 along = slip_speed > kNoSlip ? Vec3(slip / slip_speed) : AcrossTo(now.normal_W);
 
-  Rows rows;
   rows.normal = MakeRow(body, other, now.normal_W);
   rows.bounce = WantedSpeed(now.gap, step_s);
+  rows.impulse_1 = rows.impulse_2 = 0;
   if (contact.friction > 0) {
     rows.slip_1 = MakeRow(body, other, along);
     rows.slip_2 = MakeRow(body, other, now.normal_W.cross(along));
   }
-  return rows;
 }
 
 // Returns the change of velocity [m/s] that it made.
@@ -159,10 +160,13 @@ double SweepFriction(std::span<StepBody> bodies, const StepContact& contact, Row
   double wanted_1 = rows.impulse_1 - Speed(bodies, contact, rows.slip_1) / rows.slip_1.yield;
   double wanted_2 = rows.impulse_2 - Speed(bodies, contact, rows.slip_2) / rows.slip_2.yield;
   const double limit = contact.friction * contact.normal_impulse;
-  const double length = std::hypot(wanted_1, wanted_2);
-  if (length > limit) {
-    wanted_1 *= limit / length;
-    wanted_2 *= limit / length;
+  // Well inside the cone, squares tell; hypot costs as much as all the rest of a sweep.
+  if (!(wanted_1 * wanted_1 + wanted_2 * wanted_2 < 0.99 * limit * limit)) {
+    const double length = std::hypot(wanted_1, wanted_2);
+    if (length > limit) {
+      wanted_1 *= limit / length;
+      wanted_2 *= limit / length;
+    }
   }
   const double change_1 = wanted_1 - rows.impulse_1;
   const double change_2 = wanted_2 - rows.impulse_2;
@@ -201,7 +205,7 @@ void SolveVelocities(std::span<StepBody> bodies, std::span<StepContact> contacts
   std::array<Rows, kMaxStepContacts> rows;
   std::array<Row, kMaxStepSprings> spring_rows;
   for (std::size_t i = 0; i < contacts.size(); ++i) {
-    rows[i] = MakeRows(island, contacts[i], step_s);
+    MakeRows(island, contacts[i], step_s, rows[i]);
   }
   for (std::size_t i = 0; i < springs.size(); ++i) {
     spring_rows[i] =

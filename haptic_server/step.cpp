@@ -18,6 +18,7 @@
 #include "haptic_server/safety/energy_meter.h"
 #include "haptic_server/safety/peer_watch.h"
 #include "haptic_server/safety/safety_stage.h"
+#include "haptic_server/safety/split_energy.h"
 
 namespace rikiseki::haptic {
 namespace {
@@ -81,7 +82,9 @@ struct HapticStep::State {
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         peer(checked),
         safety(checked),
-        energy(checked) {
+        energy(checked),
+        split({.stiffness_n_per_m = checked.render.stiffness_n_per_m, .finger_radius_m = radius},
+              ReplayTicks(checked), own_epoch) {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
     health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
     const std::string name = device.Name();
@@ -91,7 +94,7 @@ struct HapticStep::State {
 
   bool TakeSample(DeviceSample measured, bool clutched) noexcept;
   bool TakeFrame(const WorldInput& world) noexcept;
-  void WatchWorld(const TickTime& time, const WorldInput& world, double speed) noexcept;
+  bool WatchWorld(const TickTime& time, const WorldInput& world, bool finger_known) noexcept;
   std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
   void Release() noexcept;
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
@@ -112,20 +115,22 @@ struct HapticStep::State {
   EmergencyStop emergency_stop;
   SafetyStage safety;
   EnergyMeter energy;
+  SplitEnergy split;
 
   std::uint64_t tick = 0;
   std::int64_t start_ns = 0;
-  DeviceSample sample;             // the last sound one, in W
-  double penetration = 0;          // m, |e| of the tick before
-  double surface_work = 0;         // J, since then
-  double stored = 0;               // J, in the rendered springs
-  std::uint64_t newest_epoch = 0;  // of the newest sound frame, and its number
+  DeviceSample sample;                   // the last sound one, in W
+  double penetration = 0;                // m, |e| of the tick before
+  SurfaceMotion::WorkDone surface_work;  // since then
+  double stored = 0;                     // J, in the rendered springs
+  std::uint64_t newest_epoch = 0;        // of the newest sound frame, and its number
   std::uint64_t newest_frame = 0;
   std::uint64_t shown_epoch = 0;  // whose surfaces are in the track; 0 = none
   std::uint64_t shown_frame = 0;
   std::uint64_t channel_epoch = 0;  // whose bodies the channels are about
   std::uint64_t missed_in_a_row = 0;
-  Vec3 displayed = Vec3::Zero();  // N, in W
+  std::int64_t bounded_period_ns = 0;  // of the world that health.zero_force_after_ns is about
+  Vec3 displayed = Vec3::Zero();       // N, in W
   std::array<HalfSpace, kMaxContactPlanes> planes;
   std::array<BodyShare, kMaxShares> shares;
   protocol::HapticHealth health;
@@ -159,9 +164,9 @@ bool HapticStep::State::TakeFrame(const WorldInput& world) noexcept {
   return true;
 }
 
-// Peer watch and feature track. // RT:
-void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world,
-                                   double speed) noexcept {
+// Peer watch and feature track. True if a frame came that is displayed from now on. // RT:
+bool HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world,
+                                   bool finger_known) noexcept {
   const std::int64_t elapsed_ticks = 1 + std::max<std::int64_t>(time.missed, 0);
   const bool fresh = TakeFrame(world);
   const PeerSign sign{
@@ -179,20 +184,21 @@ void HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world
     Release();
     shown_epoch = shown_frame = 0;
   }
-  if (fresh && peer.Accepts(world.epoch)) {
-    if (channel_epoch != world.epoch) {
-      ledger.BeginWorld(world.epoch);
-      channel_epoch = world.epoch;
-    }
-    // A surface as deep as the present contact, or as the finger gets in a tick or two, is no
-    // surprise.
-    const double approach = speed * Seconds(period_ns) * static_cast<double>(1 + elapsed_ticks);
-    const FingerState finger{sample.position, radius, penetration + approach + 1e-6};
-    copies.Receive(*world.frame, tick);
-    track.Receive(*world.frame, std::span(&finger, 1), copies);
-    shown_epoch = world.epoch;
-    shown_frame = world.frame->frame;
+  if (!fresh || !peer.Accepts(world.epoch)) return false;
+  if (channel_epoch != world.epoch) {
+    ledger.BeginWorld(world.epoch);
+    channel_epoch = world.epoch;
   }
+  // A surface as deep as the present contact, or as the finger gets in a tick or two, is no
+  // surprise.
+  const double speed = finger_known ? sample.velocity.stableNorm() : 0;
+  const double approach = speed * Seconds(period_ns) * static_cast<double>(1 + elapsed_ticks);
+  const FingerState finger{sample.position, radius, penetration + approach + 1e-6};
+  copies.Receive(*world.frame, tick);
+  track.Receive(*world.frame, std::span(&finger, 1), copies);
+  shown_epoch = world.epoch;
+  shown_frame = world.frame->frame;
+  return true;
 }
 
 // No contact in this tick. // RT:
@@ -200,7 +206,7 @@ void HapticStep::State::Release() noexcept {
   surface_force.Reset();
   surface_motion.Reset();
   penetration = 0;
-  surface_work = 0;
+  surface_work = {};
   stored = 0;
 }
 
@@ -270,8 +276,11 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
       has_frame
           ? static_cast<std::uint64_t>(std::max<std::int64_t>(peer.frame_age_ns(time.start_ns), 0))
           : 0;
-  health.zero_force_after_ns =
-      static_cast<std::uint64_t>(ZeroForceAfter(settings, peer.world_period_ns()));
+  if (peer.world_period_ns() != bounded_period_ns) {
+    bounded_period_ns = peer.world_period_ns();
+    health.zero_force_after_ns =
+        static_cast<std::uint64_t>(ZeroForceAfter(settings, bounded_period_ns));
+  }
   health.largest_force = std::max(health.largest_force, force.norm());
   health.largest_force_step = std::max(health.largest_force_step, (force - displayed).norm());
   health.target = ToArray(sample.target);
@@ -305,7 +314,7 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
       input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
   if (input.sample_finite) input.speed = measured.velocity.stableNorm();
 
-  state.WatchWorld(time, world, input.sample_finite ? state.sample.velocity.stableNorm() : 0);
+  const bool is_displayed = state.WatchWorld(time, world, input.sample_finite);
 
   const PeerState peer = state.peer.state();
   input.stopped = state.emergency_stop.Update(wish.stop, wish.enable, measured.enabled);
@@ -319,14 +328,19 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   } else {
     state.Release();
   }
+  state.split.Moved(state.surface_work.split);
+  const double split_work =
+      is_displayed ? state.split.Receive(world.epoch, *world.frame, state.copies, state.tick) : 0;
   const double energy_scale = state.mapping.energy_on_device();
   if (input.sample_finite) {
     state.energy.Measure({.position = measured.position,
                           .velocity = measured.velocity,
                           .duration_s = Seconds(time.previous_duration_ns),
-                          .surface_work = energy_scale * state.surface_work,
+                          .surface_work = energy_scale * state.surface_work.all,
+                          .split_work = energy_scale * split_work,
                           .stored = energy_scale * state.stored,
-                          .penetration = state.penetration});
+                          .penetration = state.penetration,
+                          .world_period_s = Seconds(state.peer.world_period_ns())});
     input.velocity = measured.velocity;
     if (state.settings.safety.passivity_controller) input.brake = state.energy.Brake();
   } else {
@@ -355,6 +369,7 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
                      .for_ground = state.mapping.ForceInWorld(state.safety.ground()),
                      .wanted = shares,
                      .finger = state.sample.position});
+  state.split.Book(state.tick, state.sample.position, state.ledger.Booked());
   state.copies.Step(state.tick, state.ledger.Booked(),
                     state.tick == 0
                         ? Seconds(state.period_ns)

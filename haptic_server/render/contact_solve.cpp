@@ -39,9 +39,10 @@ struct Basis {
   Vector d = Vector::Zero();
 };
 
-Planes Collect(const Vec3& finger, double radius, std::span<const HalfSpace> half_spaces) {
-  Planes planes;
-  Real largest = std::max<Real>(1, finger.cast<Real>().cwiseAbs().maxCoeff());
+// Everything is written where it stays: a copy of 80-bit numbers waits for them to reach memory.
+void Collect(const Vec3& finger, double radius, std::span<const HalfSpace> half_spaces,
+             Planes& planes) {
+  double largest = std::max(1.0, finger.cwiseAbs().maxCoeff());
   const std::size_t count = std::min(half_spaces.size(), kMaxContactPlanes);
   for (std::size_t i = 0; i < count; ++i) {
     const HalfSpace& half_space = half_spaces[i];
@@ -49,13 +50,14 @@ Planes Collect(const Vec3& finger, double radius, std::span<const HalfSpace> hal
     const Vector normal = half_space.normal.cast<Real>();
     const Real length = normal.norm();
     if (!(length >= kZeroNormal)) continue;
-    const Vector unit = normal / length;
     const Vector point = half_space.point.cast<Real>();
-    planes.plane[planes.count++] = {unit, unit.dot(point - finger.cast<Real>()) + radius, i};
-    largest = std::max(largest, point.cwiseAbs().maxCoeff());
+    Plane& plane = planes.plane[planes.count++];
+    plane.normal = normal / length;
+    plane.depth = plane.normal.dot(point - finger.cast<Real>()) + radius;
+    plane.index = i;
+    largest = std::max(largest, half_space.point.cwiseAbs().maxCoeff());
   }
   planes.tolerance = kTolerance * largest;
-  return planes;
 }
 
 // The plane that `d` violates most; planes.count if none beyond the tolerance.
@@ -72,13 +74,31 @@ std::size_t MostViolated(const Planes& planes, const Vector& d) {
   return worst;
 }
 
-Basis OnOne(const Planes& planes, std::size_t a) {
-  Basis basis;
-  basis.member[0] = a;
-  basis.multiplier[0] = planes.plane[a].depth;
+bool IsFree(const Planes& planes, const Vector& d) {
+  for (std::size_t i = 0; i < planes.count; ++i) {
+    const Plane& plane = planes.plane[i];
+    if (plane.depth - plane.normal.dot(d) > planes.tolerance) return false;
+  }
+  return true;
+}
+
+// The plane that the finger itself is deepest in; planes.count if in none beyond the tolerance.
+std::size_t Deepest(const Planes& planes) {
+  std::size_t deepest = planes.count;
+  Real depth = planes.tolerance;
+  for (std::size_t i = 0; i < planes.count; ++i) {
+    if (!(planes.plane[i].depth > depth)) continue;
+    depth = planes.plane[i].depth;
+    deepest = i;
+  }
+  return deepest;
+}
+
+void OnOne(const Planes& planes, std::size_t a, Basis& basis) {
+  basis.member = {a, 0, 0};
+  basis.multiplier = {planes.plane[a].depth, 0, 0};
   basis.count = 1;
   basis.d = planes.plane[a].depth * planes.plane[a].normal;
-  return basis;
 }
 
 // Two planes as an orthonormal frame: `first` = normal of a, normal of b = cosine * first + sine *
@@ -178,7 +198,10 @@ bool SolveFew(const Planes& planes, std::span<const std::size_t> few, Basis& bes
   };
   Basis candidate;
   for (std::size_t i = 0; i < few.size(); ++i) {
-    if (planes.plane[few[i]].depth > 0) consider(OnOne(planes, few[i]));
+    if (planes.plane[few[i]].depth > 0) {
+      OnOne(planes, few[i], candidate);
+      consider(candidate);
+    }
     for (std::size_t j = i + 1; j < few.size(); ++j) {
       if (OnTwo(planes, few[i], few[j], candidate)) consider(candidate);
       for (std::size_t k = j + 1; k < few.size(); ++k) {
@@ -192,24 +215,22 @@ bool SolveFew(const Planes& planes, std::span<const std::size_t> few, Basis& bes
 enum class Outcome { kFree, kSolved, kInfeasible };
 
 Outcome SolveAll(const Planes& planes, Basis& basis) {
-  std::size_t worst = MostViolated(planes, Vector::Zero());
+  std::size_t worst = Deepest(planes);
   if (worst == planes.count) return Outcome::kFree;
 
   // One plane alone? Only the deepest can be it, or those that agree with it within the tolerance:
   // of these the nearest that satisfies the others.
   const Real deepest = planes.plane[worst].depth;
-  basis = OnOne(planes, worst);
-  bool single = false;
+  std::size_t single = planes.count;
   for (std::size_t i = 0; i < planes.count; ++i) {
     const Real depth = planes.plane[i].depth;
     if (depth < deepest - planes.tolerance || !(depth > 0)) continue;
-    if (single && depth >= basis.multiplier[0]) continue;
-    const Basis alone = OnOne(planes, i);
-    if (MostViolated(planes, alone.d) != planes.count) continue;
-    basis = alone;
-    single = true;
+    if (single != planes.count && depth >= planes.plane[single].depth) continue;
+    if (IsFree(planes, depth * planes.plane[i].normal)) single = i;
   }
-  if (single) return Outcome::kSolved;
+  const bool one_is_enough = single != planes.count;
+  OnOne(planes, one_is_enough ? single : worst, basis);
+  if (one_is_enough) return Outcome::kSolved;
 
   for (int exchange = 0; exchange < kMaxExchanges; ++exchange) {
     worst = MostViolated(planes, basis.d);
@@ -312,7 +333,8 @@ ContactSolution SolveContact(const Vec3& finger, double radius,
                              std::span<const HalfSpace> half_spaces) noexcept {
   ContactSolution solution;
   solution.proxy = finger;
-  Planes planes = Collect(finger, radius, half_spaces);
+  Planes planes;
+  Collect(finger, radius, half_spaces, planes);
   Basis basis{};
   Outcome outcome = SolveAll(planes, basis);
   if (outcome == Outcome::kFree) return solution;

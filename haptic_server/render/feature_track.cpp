@@ -132,6 +132,7 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
     if (plane.pointer >= fingers.size() || !IsSound(plane)) continue;
     Feature& feature = incoming_[count++];
     feature.identity = plane;
+    feature.identity.velocity = ToArray(WithoutDenormals(ToVec3(plane.velocity)));
     feature.leaving = false;
     feature.last_point = WithoutDenormals(ToVec3(plane.point));
     feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));
@@ -238,6 +239,7 @@ std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexc
     surface.dynamic_friction = feature.identity.dynamic_friction;
     surface.strength = feature.strength;
     surface.fixed = feature.identity.inverse_mass == 0;
+    surface.copied = feature.rides;
     surface.plane = Displayed(feature);
     const double below = feature.recovery * feature.recovery_left;
     if (below > 0) surface.plane.point -= below * surface.plane.normal;

@@ -35,9 +35,8 @@ protocol::ImpulseUnits ImpulseQuantizer::Add(const Vec3& impulse) noexcept {
     const auto axis = static_cast<Eigen::Index>(i);
     double exact = impulse[axis] * kUnitsPerNewtonSecond + remainder_[axis];
     if (std::isnan(exact)) exact = 0;
-    const double whole = std::nearbyint(std::clamp(exact, -kLargestUnits, kLargestUnits));
-    units[i] = static_cast<std::int64_t>(whole);
-    remainder_[axis] = std::clamp(exact - whole, -0.5, 0.5);
+    units[i] = std::llrint(std::clamp(exact, -kLargestUnits, kLargestUnits));
+    remainder_[axis] = std::clamp(exact - static_cast<double>(units[i]), -0.5, 0.5);
   }
   return units;
 }

@@ -179,6 +179,7 @@ const BodyState* LocalBodies::Find(std::uint32_t body, std::uint32_t generation)
 }
 
 void LocalBodies::SolveStiff(std::span<BodyShare> shares) noexcept {
+  if (live_.body_count == 0) return;
   std::array<StepSpring, kMaxStepSprings> springs;
   std::array<BodyShare*, kMaxStepSprings> stiff;
   std::size_t count = 0;

@@ -22,6 +22,7 @@ struct Surface {
   double dynamic_friction = 0;   // likewise
   double strength = 1;           // 0..1, of its stiffness and damping: a vanished one fades
   bool fixed = false;            // the world says that the body cannot move
+  bool copied = false;           // it moves with a local copy of its body
   HalfSpace plane;               // unit normal
 };
 

@@ -39,7 +39,9 @@ BodyShare SurfaceForce::ShareOf(const BodyContact& body, const Vec3& force) noex
 std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
                                           const ContactSolution& contact, double radius,
                                           std::int64_t elapsed_ticks) noexcept {
-  std::array<BodyContact, kMaxContactPlanes> now;
+  const Contacts& before = contacts_[newest_];
+  newest_ = 1 - newest_;
+  Contacts& now = contacts_[newest_];
   std::size_t count = 0;
   for (std::size_t i = 0; i < std::min(surfaces.size(), kMaxContactPlanes); ++i) {
     const double multiplier = contact.multiplier[i];
@@ -85,14 +87,14 @@ std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
     body.damping /= body.weight;
     stored_ += 0.5 * body.spring.dot(body.displacement);
     body.point = contact.proxy - radius * body.displacement.stableNormalized();
-    Vec3 before = Vec3::Zero();
+    Vec3 displaced_before = Vec3::Zero();
     for (std::size_t j = 0; j < count_; ++j) {
-      if (contacts_[j].body == body.body && contacts_[j].generation == body.generation) {
-        before = contacts_[j].displacement;
+      if (before[j].body == body.body && before[j].generation == body.generation) {
+        displaced_before = before[j].displacement;
         went_on[j] = true;
       }
     }
-    Vec3 force = body.spring + body.damping * (body.displacement - before) / elapsed_s;
+    Vec3 force = body.spring + body.damping * (body.displacement - displaced_before) / elapsed_s;
     if (!adhesion_ && !(force.dot(body.displacement) > 0)) continue;
     if (body.static_friction > 0 || body.dynamic_friction > 0) {
       force += FrictionOf(body, force, way, elapsed_s);
@@ -107,13 +109,12 @@ std::span<BodyShare> SurfaceForce::Update(std::span<const Surface> surfaces,
   if (adhesion_) {  // e = 0 from now on: the damper pulls once more, which makes its impulse add up
                     // to 0
     for (std::size_t j = 0; j < count_; ++j) {
-      const BodyContact& body = contacts_[j];
+      const BodyContact& body = before[j];
       if (went_on[j]) continue;
       const Vec3 force = -body.damping * body.displacement / elapsed_s;
       shares_[share_count++] = ShareOf(body, force);
     }
   }
-  std::copy_n(now.begin(), count, contacts_.begin());
   count_ = count;
   return std::span(shares_).first(share_count);
 }

@@ -73,8 +73,11 @@ class SurfaceForce {
   Friction friction_;
   Vec3 finger_ = Vec3::Zero();  // m, centre, in the tick before
   double stored_ = 0;
-  std::size_t count_ = 0;
-  std::array<BodyContact, kMaxContactPlanes> contacts_;  // of the tick before
+  // Of this tick and the one before, which change places: they are large, and few are used.
+  using Contacts = std::array<BodyContact, kMaxContactPlanes>;
+  std::array<Contacts, 2> contacts_;
+  std::size_t newest_ = 0;
+  std::size_t count_ = 0;  // of the tick before
   std::array<BodyShare, kMaxShares> shares_;
 };
 

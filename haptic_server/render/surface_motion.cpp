@@ -11,17 +11,18 @@ double HeightAbove(const HalfSpace& plane, const Vec3& point) {
 
 }  // namespace
 
-double SurfaceMotion::Work(std::span<const Surface> surfaces, const Vec3& force,
-                           double elapsed_s) const noexcept {
-  if (count_ == 0 || force.isZero(0)) return 0;
+SurfaceMotion::WorkDone SurfaceMotion::Work(std::span<const Surface> surfaces, const Vec3& force,
+                                            double elapsed_s) const noexcept {
+  if (count_ == 0 || force.isZero(0)) return {};
   // f = c e + rest, and e = sum of multiplier_i n_i: plane i carries c multiplier_i along its normal.
   const double square = displacement_.squaredNorm();
-  if (!(square > 0)) return 0;
+  if (!(square > 0)) return {};
   const double c = force.dot(displacement_) / square;
   const Vec3 rest = force - c * displacement_;
-  double along_normals = 0;
-  double weight = 0;
-  Vec3 material = Vec3::Zero();  // m, times weight
+  double total = 0;
+  for (std::size_t i = 0; i < count_; ++i) total += pressing_[i].multiplier;
+  if (!(total > 0)) return {};
+  WorkDone done;
   for (std::size_t i = 0; i < count_; ++i) {
     const Pressing& before = pressing_[i];
     const auto now = std::find_if(surfaces.begin(), surfaces.end(), [&](const Surface& surface) {
@@ -29,12 +30,13 @@ double SurfaceMotion::Work(std::span<const Surface> surfaces, const Vec3& force,
              surface.feature == before.feature;
     });
     if (now == surfaces.end()) continue;
-    along_normals += before.multiplier * (before.height - HeightAbove(now->plane, proxy_));
-    material += before.multiplier * elapsed_s * now->velocity;
-    weight += before.multiplier;
+    const double along_normal =
+        c * before.multiplier * (before.height - HeightAbove(now->plane, proxy_));
+    const double along_surface = before.multiplier / total * elapsed_s * rest.dot(now->velocity);
+    done.all += along_normal + along_surface;
+    if (!now->fixed && !now->copied) done.split += along_normal + along_surface;
   }
-  if (!(weight > 0)) return 0;
-  return c * along_normals + rest.dot(material) / weight;
+  return done;
 }
 
 void SurfaceMotion::Remember(std::span<const Surface> surfaces,

@@ -18,10 +18,16 @@ namespace rikiseki::haptic {
 /// The sliding of the finger over its surfaces is no part of it.
 class SurfaceMotion {
  public:
+  /// What surfaces did on the hand [J].
+  struct WorkDone {
+    double all = 0;
+    double split = 0;  // of it, by bodies that can move and have no local copy
+  };
+
   /// The work [J] that the surfaces of the tick before did with the force that it displayed [N, on
   /// the user, W] by moving to where they are now. `elapsed_s` since then. // RT:
-  double Work(std::span<const Surface> surfaces, const Vec3& force,
-              double elapsed_s) const noexcept;
+  WorkDone Work(std::span<const Surface> surfaces, const Vec3& force,
+                double elapsed_s) const noexcept;
 
   /// The contact of this tick. // RT:
   void Remember(std::span<const Surface> surfaces, const ContactSolution& contact) noexcept;

@@ -18,14 +18,20 @@ inline constexpr double kUnstableEnergy = 1e-3;
 inline constexpr double kEnergyWindow = 0.2;  // s
 inline constexpr int kGrowingPeaks = 3;
 
+/// What the split adds within the window needs no peaks to be judged by where it is more than the
+/// largest force does over this way [m]: a light body that a slow world hurls away never comes back.
+inline constexpr double kHandsReach = 1;
+
 /// What the meter must know at the start of a tick.
 struct EnergySample {
   Vec3 position = Vec3::Zero();  // m, device axes
   Vec3 velocity = Vec3::Zero();  // m/s, as the device estimates it
   double duration_s = 0;         // true t_k - t_(k-1)
   double surface_work = 0;  // J, that the displayed surfaces did on the hand by moving meanwhile
+  double split_work = 0;    // J, what the split between the processes added: SplitEnergy
   double stored = 0;        // J, in the rendered springs, at full gain
   double penetration = 0;   // m, |e|; 0 = free
+  double world_period_s = 0;
 };
 
 /// E_k = E_(k-1) + f_(k-1) . (x_k - x_(k-1)) - (work of the moving surfaces): exact, for the force
@@ -34,8 +40,11 @@ struct EnergySample {
 /// A pressed spring gives back later what it holds: a hand that presses deeper each time and lets go
 /// is no instability. The *leak*, E plus what the springs hold, leaves that out. Each tick adds
 /// f_(k-1) dx plus the share of the spring's energy that is displayed, for a spring alone k/2 |de|^2 >
-/// 0: what the zero-order hold leaks. Controller and flag go by it. Where it is the bodies that press
-/// deeper each time, driven by their coupling and not by the hand, the flag goes by E itself.
+/// 0: what the zero-order hold leaks. To it comes what the split adds, which E excuses as work of
+/// the surfaces. Controller and flag go by the leak. Where it is the bodies that press deeper each
+/// time, driven by their coupling and not by the hand, the flag goes by E itself.
+///
+/// The force cap hides growth: a peak of a force that is cut counts as grown after another such.
 class EnergyMeter {
  public:
   explicit EnergyMeter(const Settings& settings);
@@ -60,11 +69,12 @@ class EnergyMeter {
   std::uint64_t times_flagged() const noexcept { return flagged_; }
 
  private:
-  void WatchPeaks(double penetration) noexcept;
+  void WatchPeaks(const EnergySample& sample) noexcept;
   void NotePeak() noexcept;
 
   double damping_;          // N s/m, b
   double largest_braking_;  // N s/m
+  double largest_split_;    // J, in a window
   double period_s_;
   std::int64_t window_ticks_;
 
@@ -79,10 +89,11 @@ class EnergyMeter {
   double injected_ = 0;
   double dissipated_ = 0;
   double contact_leak_ = 0;  // J, of the present contact, less what was braked
-  // J since the start, less dissipation: the leak, and E itself; and both one window back.
+  // J since the start: the leak and E itself, less dissipation, and what the split added.
   struct Excess {
     double leak = 0;
     double injection = 0;
+    double split = 0;
   };
   Excess excess_;
   std::vector<Excess> history_;
@@ -92,6 +103,8 @@ class EnergyMeter {
   double lowest_ = 0;   // since the last peak
   bool rising_ = true;
   double last_peak_ = 0;
+  bool is_cut_ = false;       // the force at the highest, by the safety stage
+  bool was_cut_ = false;      // likewise at the last peak
   int grown_ = 0;             // peaks in a row that were higher than the one before
   int grown_by_surface_ = 0;  // likewise, into which surfaces put more work than the hand
   double hand_work_ = 0;      // J, on the springs since the last peak

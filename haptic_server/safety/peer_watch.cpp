@@ -29,17 +29,24 @@ std::int64_t LostAfter(const Settings& settings, std::int64_t world_period_ns) n
 
 PeerWatch::PeerWatch(const Settings& settings)
     : safety_(settings.safety),
-      longest_period_ns_(Nanoseconds(settings.loop.longest_world_period_ms)),
-      world_period_ns_(longest_period_ns_) {}
+      longest_period_ns_(Nanoseconds(settings.loop.longest_world_period_ms)) {
+  SetPeriod(longest_period_ns_);
+}
+
+void PeerWatch::SetPeriod(std::int64_t world_period_ns) noexcept {
+  world_period_ns_ = world_period_ns;
+  late_after_ns_ = Periods(safety_.late_periods, world_period_ns);
+  lost_after_ns_ = LostAfter(safety_, world_period_ns);
+}
 
 bool PeerWatch::Alive(std::int64_t now_ns, const PeerSign& sign) const noexcept {
-  return sign.epoch == epoch_ && sign.ready &&
-         now_ns - sign.heartbeat_ns <= LostAfter(safety_, world_period_ns_);
+  return sign.epoch == epoch_ && sign.ready && now_ns - sign.heartbeat_ns <= lost_after_ns_;
 }
 
 void PeerWatch::NoteFrame(std::int64_t now_ns, const PeerSign& sign) noexcept {
   frame_ns_ = now_ns;
-  world_period_ns_ = std::min(sign.frame_period_ns, longest_period_ns_);
+  const std::int64_t period_ns = std::min(sign.frame_period_ns, longest_period_ns_);
+  if (period_ns != world_period_ns_) SetPeriod(period_ns);
 }
 
 PeerState PeerWatch::Update(std::int64_t now_ns, const PeerSign& sign,
@@ -48,7 +55,7 @@ PeerState PeerWatch::Update(std::int64_t now_ns, const PeerSign& sign,
   switch (state_) {
     case PeerState::kAbsent:
       epoch_ = sign.epoch;
-      world_period_ns_ = longest_period_ns_;
+      if (world_period_ns_ != longest_period_ns_) SetPeriod(longest_period_ns_);
       fresh_frames_ = 0;
       if (sign.epoch == 0 || !Alive(now_ns, sign)) {
         epoch_ = 0;
@@ -62,7 +69,7 @@ PeerState PeerWatch::Update(std::int64_t now_ns, const PeerSign& sign,
         epoch_ = 0;
         break;
       }
-      if (fresh_frames_ > 0 && age > LostAfter(safety_, world_period_ns_)) fresh_frames_ = 0;
+      if (fresh_frames_ > 0 && age > lost_after_ns_) fresh_frames_ = 0;
       if (sign.fresh_frame) {
         NoteFrame(now_ns, sign);
         if (++fresh_frames_ >= kFreshFramesForLive) state_ = PeerState::kLive;
@@ -70,13 +77,12 @@ PeerState PeerWatch::Update(std::int64_t now_ns, const PeerSign& sign,
       break;
     case PeerState::kLive:
     case PeerState::kLate:
-      if (!Alive(now_ns, sign) ||
-          (!sign.fresh_frame && age > LostAfter(safety_, world_period_ns_))) {
+      if (!Alive(now_ns, sign) || (!sign.fresh_frame && age > lost_after_ns_)) {
         state_ = PeerState::kLost;
       } else if (sign.fresh_frame) {
         NoteFrame(now_ns, sign);
         state_ = PeerState::kLive;
-      } else if (age > Periods(safety_.late_periods, world_period_ns_)) {
+      } else if (age > late_after_ns_) {
         state_ = PeerState::kLate;
       }
       break;

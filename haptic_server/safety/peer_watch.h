@@ -45,6 +45,7 @@ class PeerWatch {
  private:
   bool Alive(std::int64_t now_ns, const PeerSign& sign) const noexcept;
   void NoteFrame(std::int64_t now_ns, const PeerSign& sign) noexcept;
+  void SetPeriod(std::int64_t world_period_ns) noexcept;
 
   SafetySettings safety_;
   std::int64_t longest_period_ns_;
@@ -53,6 +54,7 @@ class PeerWatch {
   int fresh_frames_ = 0;
   std::int64_t frame_ns_ = 0;  // when the newest came
   std::int64_t world_period_ns_;
+  std::int64_t late_after_ns_, lost_after_ns_;  // with that period
 };
 
 }  // namespace rikiseki::haptic

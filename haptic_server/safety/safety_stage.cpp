@@ -20,6 +20,8 @@ constexpr double kMissedFraction = 0.01;
 constexpr double kMissedForce = 0.05;  // N
 
 bool Shorten(Vec3& v, double limit) {
+  // Far below it, squares tell, whether or not they are denormal, and cost no division.
+  if (v.squaredNorm() < 0.99 * limit * limit) return false;
   const double length = v.stableNorm();
   if (length <= limit) return false;
   v *= limit * kBelow / length;

@@ -17,7 +17,9 @@
 namespace rikiseki::lab {
 namespace {
 
-constexpr double kSlotHalf = 1e4;  // m, of the boxes on either side of the slot: nothing flies out
+// m, of the boxes on either side of the slot: next to nothing flies out. Bullet takes what is longer
+// than 1e6 m out of its world.
+constexpr double kSlotHalf = 1.4e5;
 constexpr double kFirstForce = 0.5;   // N, at most, that the finger in the slot starts with
 constexpr double kFirstDepth = 1e-3;  // m, likewise
 constexpr double kSqueeze = 5e-4;     // m, of the prescribed finger

@@ -8,11 +8,13 @@
 #include "common/command_line.h"
 #include "common/daemon.h"
 #include "common/exit_code.h"
+#include "tests/lab/buzz.h"
 #include "tests/lab/extremes.h"
 #include "tests/lab/fig6.h"
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/pushes.h"
+#include "tests/lab/slides.h"
 #include "tests/lab/study.h"
 #include "tests/lab/wall.h"
 
@@ -21,7 +23,8 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Extremes(), Fig6(), MultirateMasses(), MultirateGrowth(), Planes(), Pushes(), Wall()};
+  return {Buzz(),   Extremes(), Fig6(), MultirateMasses(), MultirateGrowth(), Planes(),
+          Pushes(), Slides(),   Wall()};
 }
 
 struct Options {

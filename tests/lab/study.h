@@ -49,7 +49,8 @@ struct Case {
   std::function<Table(bool quick)> grid;
 
   /// Computes one row: a pure function of its arguments, called from several threads. Throws
-  /// ConfigError where the row makes no sense. Never returns kMissed: the study compares.
+  /// ConfigError where the row makes no sense. Comparing is the study's: kMissed is returned only
+  /// where a bar is broken that holds for every row.
   std::function<Outcome(const Row& row, std::uint64_t seed)> run;
 
   /// Whether result `index` is what the row expects of it, where more than the column's tolerance

@@ -101,11 +101,11 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .normal = ToArray(normal),
                          .stiffness = collider.stiffness_n_per_m.value_or(0),
                          .damping = collider.damping_ns_per_m.value_or(0),
+                         .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
                          .inverse_mass = Mobility(scene_body, state, point, normal)};
           if (finger.friction > 0 && collider.friction > 0) {
             const double static_friction = collider.static_friction.value_or(collider.friction);
-            found.plane.velocity = ToArray(surface_velocity);
             found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);
             found.plane.static_friction = std::sqrt(finger.friction * static_friction);
           }

@@ -22,7 +22,7 @@ double Work(const Vec3& finger, const std::vector<Surface>& before, const std::v
   for (const Surface& surface : before) planes.push_back(surface.plane);
   SurfaceMotion motion;
   motion.Remember(before, SolveContact(finger, 0.01, planes));
-  return motion.Work(now, force, elapsed_s);
+  return motion.Work(now, force, elapsed_s).all;
 }
 
 const Vec3 kFinger(0.008, 0.003, 0);  // 2 mm deep in a floor at x = 0 that faces +x

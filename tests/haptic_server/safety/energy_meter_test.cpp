@@ -138,6 +138,62 @@ TEST_CASE("bodies that press deeper each time, driven by their coupling, are fla
   CHECK(FlagsOfOscillatingWall(1) == 0);
 }
 
+// A finger at rest in a wall that comes and goes, `ticks` per cycle; once in each the split adds 2 mJ.
+// The safety stage cuts the force at `cap`.
+std::uint64_t FlagsOfSplit(double growth, int ticks, double world_period_s, double cap) {
+  EnergyMeter meter(BareDevice());
+  double amplitude = 0.002;
+  double before = 0;
+  double force = 0;
+  for (int cycle = 0; cycle < 8; ++cycle, amplitude *= growth) {
+    for (int k = 0; k < ticks; ++k) {
+      const double depth = std::max(0.0, amplitude * std::sin(2 * M_PI * k / ticks));
+      meter.Measure({.position = Vec3::Zero(),
+                     .velocity = Vec3::Zero(),
+                     .duration_s = kPeriod,
+                     .surface_work = force * (before - depth),
+                     .split_work = k == 0 ? 2e-3 : 0,
+                     .stored = 2000 * depth * depth / 2,
+                     .penetration = depth,
+                     .world_period_s = world_period_s});
+      before = depth;
+      force = -std::min(cap, 2000 * depth);
+      meter.Displayed(Vec3(force, 0, 0), Vec3::Zero(), Vec3(-2000 * depth, 0, 0));
+    }
+  }
+  return meter.times_flagged();
+}
+
+TEST_CASE("what the split adds is no work of the bodies: where the peaks grow, it is flagged") {
+  CHECK(FlagsOfSplit(1.05, 500, 0.05, 1e9) == 1);
+  CHECK(FlagsOfSplit(0.95, 500, 0.05, 1e9) == 0);
+}
+
+TEST_CASE("the cap hides growth, so that peaks that are cut count as grown") {
+  CHECK(FlagsOfSplit(0.95, 500, 0.05, 2) == 1);
+  CHECK(FlagsOfSplit(0.95, 500, 0.05, 5) == 0);  // never cut
+}
+
+TEST_CASE("a cycle may take some periods of a slow world; slower ones are a hand's") {
+  CHECK(FlagsOfSplit(1.05, 4000, 0.05, 1e9) == 0);
+  CHECK(FlagsOfSplit(1.05, 4000, 1, 1e9) > 0);
+}
+
+TEST_CASE("a body that is hurled away needs no peaks to be seen") {
+  for (const double energy : {8.0, 12.0}) {
+    CAPTURE(energy);
+    Settings settings = BareDevice();
+    settings.safety.force_cap_n = 10;
+    EnergyMeter meter(settings);
+    for (int k = 0; k < 1000; ++k) {
+      // In ten frames of 20 ms, the window.
+      meter.Measure(
+          {.duration_s = kPeriod, .split_work = k % 20 == 0 && k < 200 ? energy / 10 : 0});
+    }
+    CHECK(meter.times_flagged() == (energy > 10 ? 1 : 0));
+  }
+}
+
 TEST_CASE("the flag goes when the buzz is over, and is counted once") {
   Wall wall(BareDevice(), 4000);
   Bouncing mass(0.03, 0.2, -0.002, 0.2);
