@@ -12,6 +12,7 @@
 #include "common/version.h"
 #include "world_server/loop.h"
 #include "world_server/physics/bullet_world.h"
+#include "world_server/scene/needs.h"
 #include "world_server/scene/scene_message.h"
 #include "world_server/scene/sdf_loader.h"
 
@@ -133,7 +134,9 @@ int Run(int argc, char** argv) {
   const Scene& scene = ready.loaded.scene;
   if (options.check) {
     std::fputs(description.c_str(), stdout);
-    std::printf("scene %s: %zu bodies\n", scene.name.c_str(), scene.bodies.size());
+    const SceneNeeds needs = WorkOutNeeds(scene);
+    std::printf("scene %s: %zu bodies\nneeds: %s\nleft out: %s\n", scene.name.c_str(),
+                scene.bodies.size(), InWords(needs.needs).c_str(), InWords(needs.left_out).c_str());
     return kExitOk;
   }
   BlockSignals();

@@ -1,5 +1,5 @@
 // Which bodies a finger could reach: the cheap question before the exact one. What can move is asked
-// one by one (1.5 ns each, less than a tree of moving things costs to keep up), what cannot move is
+// one by one (7 ns each, less than a tree of moving things costs to keep up), what cannot move is
 // asked through a tree as soon as there is much of it.
 #pragma once
 

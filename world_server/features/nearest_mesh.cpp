@@ -12,6 +12,7 @@ namespace {
 constexpr double kTie = 1e-12;       // of the size: feet as near as this are equally near
 constexpr double kSameFoot = 1e-11;  // of the size
 constexpr double kLift = 1e-8;       // of the size, off the surface
+constexpr double kSlack = 1e-6;      // of a cosine
 const double kParallel = std::cos(5 * std::numbers::pi / 180);
 
 // Where a triangle is nearest, and on which part of it: its face, an edge, or a corner.
@@ -138,9 +139,10 @@ class Nearest {
 
   void Look(std::uint32_t face) {
     const Foot foot = FootOn(mesh_, face, p_);
-    const double distance = (p_ - foot.point).stableNorm();
+    const double squared_distance = (p_ - foot.point).squaredNorm();
+    if (squared_distance > reach_) return;
+    const double distance = std::sqrt(squared_distance);
     const double tie = kTie * (mesh_.size() + distance);
-    if (distance > distance_ + tie) return;
     const bool same = (foot.point - foot_.point).norm() <= kSameFoot * mesh_.size();
     if (distance < distance_ - tie) {
       tied_ = false;
@@ -193,14 +195,17 @@ bool IsMinimum(const TriangleMesh& mesh, const Foot& foot, const Vec3& p) {
 // and E. Cohen, "Spatialized normal cone hierarchies", 2001.
 bool MayFace(const TriangleMesh& mesh, std::uint32_t node, const Vec3& p) {
   const TriangleMesh::NormalCone& cone = mesh.cone(node);
-  if (cone.half_angle >= std::numbers::pi) return true;
+  if (cone.half_angle >= std::numbers::pi / 2) return true;
   const Bounds& bounds = mesh.tree().nodes()[node].bounds;
   const Vec3 towards = p - (bounds.low + bounds.high) / 2;
   const double radius = (bounds.high - bounds.low).norm() / 2;
   const double distance = towards.norm();
   if (distance <= radius) return true;
-  const double spread = cone.half_angle + std::asin(radius / distance) + 1e-6;
-  return spread >= std::numbers::pi || cone.axis.dot(towards) >= distance * std::cos(spread);
+  // Both angles are below a right one; together they may reach beyond it.
+  const double sine = radius / distance;
+  const double cosine = std::sqrt((1 - sine) * (1 + sine));
+  const double least = cone.cosine * cosine - cone.sine * sine;
+  return cone.axis.dot(towards) >= (least - kSlack) * distance;
 }
 
 void FindMinima(const TriangleMesh& mesh, const Vec3& p, double radius,

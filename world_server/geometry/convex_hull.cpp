@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <deque>
+#include <numeric>
 #include <stdexcept>
+#include <tuple>
 
 namespace rikiseki::world {
 namespace {
@@ -58,14 +60,21 @@ class QuickHull {
     return static_cast<int>(faces_.size()) - 1;
   }
 
-  // The point that is largest by some measure.
-  template <typename Measure>
-  int Farthest(const Measure& measure) const {
-    int best = 0;
-    for (int i = 1; i < static_cast<int>(points_.size()); ++i) {
-      if (measure(points_[i]) > measure(points_[best])) best = i;
+  // The point that is largest by some measure; of equal ones the last along x, y and z, which is a
+  // corner of them and not one in their middle.
+  template <typename Candidates, typename Measure>
+  int Farthest(const Candidates& candidates, const Measure& measure) const {
+    int best = candidates[0];
+    for (const int i : candidates) {
+      const double lead = measure(points_[i]) - measure(points_[best]);
+      const bool tied = std::abs(lead) <= flat_;
+      if (tied ? After(points_[i], points_[best]) : lead > 0) best = i;
     }
     return best;
+  }
+
+  static bool After(const Vec3& a, const Vec3& b) {
+    return std::tuple(a.x(), a.y(), a.z()) > std::tuple(b.x(), b.y(), b.z());
   }
 
   // A tetrahedron of points far from each other.
@@ -81,16 +90,18 @@ class QuickHull {
     const double least = 1e-9 * size;  // a body so thin has no inside to speak of
     int axis = 0;
     (bounds.high - bounds.low).maxCoeff(&axis);
-    const int a = Farthest([&](const Vec3& p) { return -p[axis]; });
-    const int b = Farthest([&](const Vec3& p) { return p[axis]; });
+    std::vector<int> all(points_.size());
+    std::iota(all.begin(), all.end(), 0);
     refuse(!(size > 0));
+    const int a = Farthest(all, [&](const Vec3& p) { return -p[axis]; });
+    const int b = Farthest(all, [&](const Vec3& p) { return p[axis]; });
     const Vec3 line = (points_[b] - points_[a]).normalized();
     const auto off_line = [&](const Vec3& p) { return line.cross(p - points_[a]).norm(); };
-    const int c = Farthest(off_line);
+    const int c = Farthest(all, off_line);
     refuse(!(off_line(points_[c]) > least));
     const Vec3 normal = line.cross(points_[c] - points_[a]).normalized();
     const auto off_plane = [&](const Vec3& p) { return std::abs(normal.dot(p - points_[a])); };
-    const int d = Farthest(off_plane);
+    const int d = Farthest(all, off_plane);
     refuse(!(off_plane(points_[d]) > least));
     const bool above = normal.dot(points_[d] - points_[a]) > 0;
     const int first = above ? c : b;
@@ -103,8 +114,6 @@ class QuickHull {
     faces_[1].neighbours = {3, 2, 0};
     faces_[2].neighbours = {1, 3, 0};
     faces_[3].neighbours = {2, 1, 0};
-    std::vector<int> all;
-    for (int i = 0; i < static_cast<int>(points_.size()); ++i) all.push_back(i);
     Share(all, 0);
   }
 
@@ -124,10 +133,8 @@ class QuickHull {
   }
 
   void Grow(int start) {
-    const std::vector<int>& outside = faces_[start].outside;
-    const int tip = *std::max_element(outside.begin(), outside.end(), [&](int a, int b) {
-      return Height(faces_[start], a) < Height(faces_[start], b);
-    });
+    const int tip =
+        Farthest(faces_[start].outside, [&](const Vec3& p) { return faces_[start].normal.dot(p); });
     std::vector<RimEdge> rim;
     std::vector<int> orphans;
     const int first_new = static_cast<int>(faces_.size());

@@ -10,7 +10,7 @@
 namespace rikiseki::world {
 namespace {
 
-constexpr std::uint32_t kLeafSize = 4;
+constexpr std::uint32_t kLeafSize = 2;
 constexpr double kFlat = 1e-14;  // of the longest edge: a triangle lower than this has no normal
 
 struct HalfEdge {
@@ -192,6 +192,10 @@ void TriangleMesh::FindCones() {
     // Normals between others stay within a cone only up to a half space.
     if (cone.half_angle > std::numbers::pi / 2) cone.half_angle = std::numbers::pi;
     cones_[i] = cone;
+  }
+  for (NormalCone& cone : cones_) {
+    cone.cosine = std::cos(cone.half_angle);
+    cone.sine = std::sin(cone.half_angle);
   }
 }
 

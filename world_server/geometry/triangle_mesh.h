@@ -39,7 +39,8 @@ class TriangleMesh {
   /// The normals at which a node's surface may be met: of its triangles and their neighbours.
   struct NormalCone {
     Vec3 axis = Vec3::UnitZ();
-    double half_angle = 0;  // rad; pi: any
+    double half_angle = 0;        // rad; pi: any
+    double cosine = 1, sine = 0;  // of it
   };
 
   /// Corners at the same place are made one. Throws std::invalid_argument where a corner does not

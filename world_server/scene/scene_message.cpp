@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "world_server/scene/needs.h"
+
 namespace rikiseki::world {
 namespace {
 
@@ -66,10 +68,8 @@ protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol:
   message.revision = revision;
   message.gravity = ToArray(scene.gravity);
   message.name = Padded<64>(scene.name);
-  bool moving = false;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
-    moving = moving || !body.fixed;
     message.bodies.push_back({bodies[i].body, bodies[i].generation, body.fixed ? 1u : 0u,
                               static_cast<std::uint32_t>(body.colliders.size()),
                               Padded<64>(body.name)});
@@ -83,7 +83,9 @@ protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol:
       }
     }
   }
-  (moving ? message.needs : message.left_out) |= protocol::kNeedMovingBodies;
+  const SceneNeeds worked_out = WorkOutNeeds(scene);
+  message.needs = worked_out.needs;
+  message.left_out = worked_out.left_out;
   return message;
 }
 

@@ -46,6 +46,7 @@ TEST_CASE("hulls of random points, of points on a sphere, and of grids") {
   for (int i = 0; i < 9 * 9 * 9; ++i) grid.push_back(0.1 * Vec3(i % 9, i / 9 % 9, i / 81));
   const TriangleMesh cube = ConvexHull(grid);
   RequireHull(cube, grid);
+  CHECK(cube.corners().size() == 8);
   CHECK(cube.Volume() == Approx(0.512).epsilon(1e-12));
   // A turned one, where points of a face are no longer exactly in a plane.
   const Quat turn = Quat(0.3, -0.5, 0.2, 0.8).normalized();
@@ -65,6 +66,7 @@ TEST_CASE("the hull of a cylinder's points has its volume") {
   const TriangleMesh hull = ConvexHull(points);
   const double area = n / 2.0 * std::sin(2 * 3.14159265358979323846 / n);
   CHECK(hull.flaws().closed());
+  CHECK(hull.corners().size() == 2 * n);
   CHECK(hull.Volume() == Approx(0.2 * area).epsilon(1e-12));
 }
 

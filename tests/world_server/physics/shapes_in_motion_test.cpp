@@ -79,10 +79,11 @@ TEST_CASE("balls and boxes stay on a mesh and in the corner of it") {
       Run(world, 0.01);
       nearest = std::min(nearest, world.State(1).pose.position.x());
       REQUIRE(world.State(1).pose.position.allFinite());
-      REQUIRE(world.State(1).pose.position.z() > 0.0295);
+      REQUIRE(world.State(1).pose.position.z() > 0.029);
     }
     CAPTURE(shape.index());
-    CHECK(nearest == Approx(0.03).margin(5e-4));  // the wall stopped it
+    // The wall stopped it; Bullet meets a triangle when it is overlapped, a substep of 1.5 mm late.
+    CHECK(nearest == Approx(0.03).margin(2e-3));
   }
 }
 

@@ -17,10 +17,14 @@ TEST_CASE("a scene is described body by body, collider by collider") {
       {.shape = Cylinder{0.1, 0.2}, .pose_BS = {Vec3(1, 2, 3), Quat(0, 0, 1, 0)}}};
   scene.bodies[1].name = "block::link";
   scene.bodies[1].mass_kg = 1;
-  scene.bodies[1].colliders = {{.shape = Box{Vec3(4, 5, 6)}},
-                               {.shape = Sphere{7}},
-                               {.shape = Capsule{8, 9}},
-                               {.shape = Ellipsoid{Vec3(10, 11, 12)}}};
+  scene.bodies[1].colliders = {
+      {.shape = Box{Vec3(4, 5, 6)}},
+      {.shape = Sphere{7}},
+      {.shape = Capsule{8, 9}},
+      {.shape = Ellipsoid{Vec3(10, 11, 12)}},
+      {.shape = Hull{.mesh = nullptr,
+                     .file = {.path = "/a/b.stl", .sha256 = {1, 2}, .scale = Vec3(1, 2, 3)}}},
+      {.shape = Mesh{.mesh = nullptr, .file = {.path = "/c.obj"}}}};
   std::vector<protocol::Body> bodies(2);
   bodies[0].body = 0;
   bodies[0].generation = 3;
@@ -39,7 +43,7 @@ TEST_CASE("a scene is described body by body, collider by collider") {
   CHECK(std::string(message.bodies[1].name.data()) == "block::link");
   CHECK(message.bodies[1].body == 1);
   CHECK(message.bodies[1].fixed == 0);
-  REQUIRE(message.colliders.size() == 6);
+  REQUIRE(message.colliders.size() == 8);
   using protocol::ShapeType;
   using protocol::Vector;
   const auto& c = message.colliders;
@@ -55,11 +59,19 @@ TEST_CASE("a scene is described body by body, collider by collider") {
   CHECK(c[4].shape == ShapeType::kCapsule);
   CHECK(c[4].dimensions == Vector{8, 9, 0});
   CHECK(c[5].shape == ShapeType::kEllipsoid);
+  CHECK(c[6].shape == ShapeType::kMesh);
+  CHECK(c[6].dimensions == Vector{1, 2, 3});
+  CHECK(c[7].shape == ShapeType::kMesh);
+  REQUIRE(message.meshes.size() == 2);
+  CHECK(std::string(message.meshes[0].path.data()) == "/a/b.stl");
+  CHECK(message.meshes[0].sha256[1] == 2);
+  CHECK(std::string(message.meshes[1].path.data()) == "/c.obj");
 
   scene.bodies.resize(1);
   const protocol::WorldScene still = DescribeScene(scene, bodies, 6);
   CHECK(still.needs == 0);
-  CHECK(still.left_out == protocol::kNeedMovingBodies);
+  CHECK((still.left_out & protocol::kNeedMovingBodies) != 0);
+  CHECK((still.needs & still.left_out) == 0);
 }
 
 }  // namespace

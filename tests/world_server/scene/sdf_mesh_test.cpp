@@ -1,5 +1,4 @@
-#include "world_server/scene/sdf_mesh.h"
-
+// <mesh> collisions, through the loader.
 #include <unistd.h>
 
 #include <catch2/catch.hpp>
