@@ -275,6 +275,7 @@ std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexc
     surface.strength = feature.strength;
     surface.fixed = feature.identity.inverse_mass == 0;
     surface.copied = feature.rides;
+    surface.radius = feature.identity.radius;
     surface.plane = DisplayedTo(feature, fingers_[surface.pointer]);
     const double below = feature.recovery * feature.recovery_left;
     if (below > 0) surface.plane.point -= below * surface.plane.normal;

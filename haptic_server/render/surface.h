@@ -23,6 +23,7 @@ struct Surface {
   double strength = 1;           // 0..1, of its stiffness and damping: a vanished one fades
   bool fixed = false;            // the world says that the body cannot move
   bool copied = false;           // it moves with a local copy of its body
+  double radius = 0;             // m, of the ball that `plane` is tangent to; 0 = it is flat
   HalfSpace plane;               // unit normal
 };
 

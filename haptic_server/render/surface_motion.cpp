@@ -5,8 +5,12 @@
 namespace rikiseki::haptic {
 namespace {
 
-double HeightAbove(const HalfSpace& plane, const Vec3& point) {
-  return plane.normal.dot(point - plane.point);
+// Above a ball, of which every tick shows another plane, as above what it stays.
+double HeightAbove(const Surface& surface, const Vec3& point) {
+  const HalfSpace& plane = surface.plane;
+  const Vec3 from_plane = point - plane.point;
+  if (!(surface.radius > 0)) return plane.normal.dot(from_plane);
+  return (from_plane + surface.radius * plane.normal).norm() - surface.radius;
 }
 
 }  // namespace
@@ -30,8 +34,7 @@ SurfaceMotion::WorkDone SurfaceMotion::Work(std::span<const Surface> surfaces, c
              surface.feature == before.feature;
     });
     if (now == surfaces.end()) continue;
-    const double along_normal =
-        c * before.multiplier * (before.height - HeightAbove(now->plane, proxy_));
+    const double along_normal = c * before.multiplier * (before.height - HeightAbove(*now, proxy_));
     const double along_surface = before.multiplier / total * elapsed_s * rest.dot(now->velocity);
     done.all += along_normal + along_surface;
     if (!now->fixed && !now->copied) done.split += along_normal + along_surface;
@@ -49,7 +52,7 @@ void SurfaceMotion::Remember(std::span<const Surface> surfaces,
                            .generation = surface.generation,
                            .feature = surface.feature,
                            .multiplier = contact.multiplier[i],
-                           .height = HeightAbove(surface.plane, contact.proxy)};
+                           .height = HeightAbove(surface, contact.proxy)};
   }
   proxy_ = contact.proxy;
   displacement_ = contact.displacement;

@@ -1,6 +1,7 @@
 #include "haptic_server/render/surface_motion.h"
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <vector>
 
 namespace rikiseki::haptic {
@@ -61,6 +62,34 @@ TEST_CASE("what is no normal force works along with the body's material") {
   CHECK(Work(kFinger, floor, floor, Vec3(4, 0, 0) + friction, 2e-3) ==
         Approx(1.5 * 0.2 * 2e-3).epsilon(1e-12));
   CHECK(std::abs(Work(kFinger, floor, floor, Vec3(4, 0, 0), 2e-3)) < 1e-15);
+}
+
+TEST_CASE("a ball at rest does nothing to a finger that slides round it, one that moves does") {
+  const auto ball = [](const Vec3& centre, double angle) {
+    const Vec3 normal(std::cos(angle), std::sin(angle), 0);
+    Surface surface = At(centre + 0.03 * normal, normal);
+    surface.radius = 0.03;
+    return surface;
+  };
+  const Vec3 finger(0.038, 0, 0);
+  CHECK(std::abs(Work(finger, {ball(Vec3::Zero(), 0)}, {ball(Vec3::Zero(), 0.01)}, Vec3(4, 0, 0))) <
+        1e-15);
+  CHECK(Work(finger, {ball(Vec3::Zero(), 0)}, {ball(Vec3(1e-4, 0, 0), 0.01)}, Vec3(4, 0, 0)) ==
+        Approx(4e-4).epsilon(1e-9));
+}
+
+TEST_CASE("bodies that can move and have no copy are counted apart") {
+  std::vector<Surface> wedge = {At(Vec3::Zero(), Vec3::UnitX(), 1),
+                                At(Vec3::Zero(), Vec3::UnitY(), 2)};
+  std::vector<Surface> moved = wedge;
+  for (Surface& surface : moved) surface.plane.point += 1e-4 * surface.plane.normal;
+  moved[1].copied = true;
+  SurfaceMotion motion;
+  const std::vector<HalfSpace> planes = {wedge[0].plane, wedge[1].plane};
+  motion.Remember(wedge, SolveContact(Vec3(0.008, 0.007, 0), 0.01, planes));
+  const SurfaceMotion::WorkDone done = motion.Work(moved, Vec3(4, 6, 0), 1e-3);
+  CHECK(done.all == Approx(1e-3).epsilon(1e-12));
+  CHECK(done.split == Approx(4e-4).epsilon(1e-12));
 }
 
 TEST_CASE("surfaces that went, and a finger that is free, do nothing") {
