@@ -215,6 +215,7 @@ void HapticStep::State::Release() noexcept {
 // RT:
 std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
                                                      bool& no_channel) noexcept {
+  track.MoveFinger(kPointer, sample.position);
   const std::span<const Surface> surfaces = track.Surfaces(copies);
   for (std::size_t i = 0; i < surfaces.size(); ++i) planes[i] = surfaces[i].plane;
   const ContactSolution contact =

@@ -31,6 +31,7 @@ inline constexpr std::uint32_t kFrameFriction = 4;    // of each plane
 inline constexpr std::uint32_t kFrameRecovery = 8;    // of each plane
 inline constexpr std::uint32_t kFrameLocalBodies = 16;
 inline constexpr std::uint32_t kFrameMobility = 32;  // of each plane
+inline constexpr std::uint32_t kFrameRounding = 64;  // of each plane
 inline constexpr std::uint32_t kHealthReconciliation = 1;
 inline constexpr std::uint32_t kHealthEnergy = 2;
 inline constexpr std::uint32_t kSceneMeshes = 1;
@@ -39,9 +40,9 @@ inline constexpr std::uint32_t kSceneMeshes = 1;
 inline constexpr std::uint32_t kHapticTickBytes =
     80 + kMaxPointers * (88 + 80) + kMaxChannels * 144 + 48;
 inline constexpr std::uint32_t kHapticHealthBytes = 328 + 2 * 8 * kHistogramBuckets + 24 + 32;
-inline constexpr std::uint32_t kWorldFrameBytes = 104 + kMaxPlanes * (64 + 16 + 24 + 16 + 8 + 8) +
-                                                  16 +
-                                                  kMaxLocalBodies * (224 + kMaxContactPlanes * 136);
+inline constexpr std::uint32_t kWorldFrameBytes =
+    104 + kMaxPlanes * (64 + 16 + 24 + 16 + 8 + 8 + 8) + 16 +
+    kMaxLocalBodies * (224 + kMaxContactPlanes * 136);
 inline constexpr std::uint32_t kWorldHealthBytes = 288 + 2 * 8 * kHistogramBuckets;
 constexpr std::uint32_t WorldBodiesBytes(std::uint32_t bodies) {
   return 8 + 120 * bodies;

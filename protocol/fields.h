@@ -1,5 +1,5 @@
 // The one list of what travels, in order: the encoder, the decoder, and the layout fingerprint all
-// walk it, so they cannot disagree. Private to codec.cpp and layout.h; SPEC.md section 6 is the
+// walk it, so they cannot disagree. Private to the codec and layout.h; SPEC.md section 6 is the
 // same as prose.
 //
 // An archive is called as archive(name, value) for integers, enumerators, doubles and arrays of
@@ -111,6 +111,11 @@ constexpr void PlaneRecoveryFields(Archive& archive, P& p) {
 template <typename Archive, typename P>
 constexpr void PlaneMobilityFields(Archive& archive, P& p) {
   archive("inverse_mass", p.inverse_mass);
+}
+
+template <typename Archive, typename P>
+constexpr void PlaneRoundingFields(Archive& archive, P& p) {
+  archive("radius", p.radius);
 }
 
 template <typename Archive, typename Message>

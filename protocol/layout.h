@@ -160,6 +160,7 @@ constexpr void WriteLayout(Sink& sink) {
   const auto friction = [](auto& a, const Plane& p) { PlaneFrictionFields(a, p); };
   const auto recovery = [](auto& a, const Plane& p) { PlaneRecoveryFields(a, p); };
   const auto mobility = [](auto& a, const Plane& p) { PlaneMobilityFields(a, p); };
+  const auto rounding = [](auto& a, const Plane& p) { PlaneRoundingFields(a, p); };
   const auto local_head = [](auto& a, const WorldFrame& m) { LocalHeadFields(a, m); };
   const auto local_body = [](auto& a, const LocalBody& b) { LocalBodyFields(a, b); };
   const auto contact = [](auto& a, const ContactPlane& c) { ContactPlaneFields(a, c); };
@@ -191,6 +192,7 @@ constexpr void WriteLayout(Sink& sink) {
   record("world.frame/local_body", local_body, LocalBody{});
   record("world.frame/contact_plane", contact, ContactPlane{});
   record("world.frame/plane_mobility", mobility, Plane{});
+  record("world.frame/plane_rounding", rounding, Plane{});
   record("world.health", world_health, WorldHealth{});
   record("world.bodies", bodies, WorldBodiesHeadRecord{});
   record("world.bodies/body", body, Body{});

@@ -38,8 +38,8 @@ enum class StreamType : std::uint32_t {
 
 /// How often a stream's payload has grown since its first version. SPEC.md 3.2, 8.1.
 constexpr std::uint16_t TypeVersion(StreamType type) {
-  const bool grew_twice = type == StreamType::kWorldFrame || type == StreamType::kHapticHealth;
-  return grew_twice ? 3 : 1;
+  if (type == StreamType::kWorldFrame) return 4;
+  return type == StreamType::kHapticHealth ? 3 : 1;
 }
 
 /// Why the displayed force is what it is. The numbers are wire format: append only.
@@ -147,6 +147,9 @@ struct Plane {
   double recovery_s = 0;  // how long its force takes to come and go; 0 = the haptic side's own
   double inverse_mass = kMobilityNotSaid;  // 1/kg, how the body yields there along the normal; 0 =
                                            // it cannot move
+  double radius =
+      0;  // m: the surface there is a ball of this radius, whose centre is point - radius
+          // * normal; 0 = nothing is said, it is flat
 };
 
 /// Where a local body touches, or may touch before the next frame, something else than the finger.
@@ -376,7 +379,7 @@ struct WorldScene {
   std::vector<SceneMesh> meshes;         // of each collider of shape kMesh, in their order
 };
 
-static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 136);
+static_assert(sizeof(Pointer) == 168 && sizeof(Channel) == 144 && sizeof(Plane) == 144);
 static_assert(sizeof(ContactPlane) == 136 && sizeof(LocalBody) == 224 + 16 * 136);
 static_assert(sizeof(Body) == 120 && sizeof(SceneCollider) == 120 && sizeof(SceneBody) == 80 &&
               sizeof(SceneMesh) == 256);

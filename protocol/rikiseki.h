@@ -55,8 +55,8 @@
  * Constants */
 
 #define RK_VERSION_MAJOR 0
-#define RK_VERSION_MINOR 3
-#define RK_LAYOUT_HASH UINT64_C(0x2C03F6A567697CB9) /* 8.3 */
+#define RK_VERSION_MINOR 4
+#define RK_LAYOUT_HASH UINT64_C(0xACAE8D32F68C7538) /* 8.3 */
 
 #define RK_MAGIC UINT64_C(0x494B4553494B4952) /* "RIKISEKI" */
 #define RK_BYTE_ORDER UINT32_C(0x01020304)
@@ -124,6 +124,7 @@ enum rk_reason { /* 6.6 */
 #define RK_FRAME_RECOVERY 8u
 #define RK_FRAME_LOCAL_BODIES 16u
 #define RK_FRAME_MOBILITY 32u
+#define RK_FRAME_ROUNDING 64u
 #define RK_HEALTH_RECONCILIATION 1u
 #define RK_HEALTH_ENERGY 2u
 #define RK_SCENE_MESHES 1u
@@ -306,6 +307,10 @@ typedef struct rk_contact_plane { /* world.frame/contact_plane */
 typedef struct rk_plane_mobility { /* world.frame/plane_mobility */
   double inverse_mass;             /* 1/kg; 0 = it cannot move; RK_MOBILITY_NOT_SAID */
 } rk_plane_mobility;
+
+typedef struct rk_plane_rounding { /* world.frame/plane_rounding */
+  double radius;                   /* m, of the ball about point - radius * normal; 0 = flat */
+} rk_plane_rounding;
 
 typedef struct rk_scheduling {
   uint32_t policy;
@@ -494,6 +499,7 @@ RK_AT(rk_contact_plane, gap, 56);
 RK_AT(rk_contact_plane, impulse, 104);
 RK_AT(rk_contact_plane, radius, 128);
 RK_SIZE(rk_plane_mobility, 8);
+RK_SIZE(rk_plane_rounding, 8);
 RK_SIZE(rk_reconciliation, 24);
 RK_SIZE(rk_energy, 32);
 RK_SIZE(rk_scene_head, 120);
@@ -524,6 +530,7 @@ typedef struct rk_frame {
   rk_local_body local_body[RK_MAX_LOCAL_BODIES];
   rk_contact_plane contact[RK_MAX_LOCAL_BODIES][RK_MAX_CONTACT_PLANES]; /* of local_body[i] */
   rk_plane_mobility mobility[RK_MAX_PLANES];                            /* of plane[i] */
+  rk_plane_rounding rounding[RK_MAX_PLANES];                            /* likewise; 0 = flat */
 } rk_frame;
 
 /* Room for the largest message of a stream. */
@@ -531,13 +538,14 @@ typedef struct rk_frame {
   ((uint32_t)(sizeof(rk_tick_head) +                                                 \
               RK_MAX_POINTERS * (sizeof(rk_pointer) + sizeof(rk_pointer_rotation)) + \
               RK_MAX_CHANNELS * sizeof(rk_channel) + sizeof(rk_ground)))
-#define RK_FRAME_BYTES                                                                  \
-  ((uint32_t)(sizeof(rk_frame_head) +                                                   \
-              RK_MAX_PLANES * (sizeof(rk_plane) + sizeof(rk_plane_surface) +            \
-                               sizeof(rk_plane_velocity) + sizeof(rk_plane_friction) +  \
-                               sizeof(rk_plane_recovery) + sizeof(rk_plane_mobility)) + \
-              sizeof(rk_local_head) +                                                   \
-              RK_MAX_LOCAL_BODIES *                                                     \
+#define RK_FRAME_BYTES                                                                       \
+  ((uint32_t)(sizeof(rk_frame_head) +                                                        \
+              RK_MAX_PLANES *                                                                \
+                  (sizeof(rk_plane) + sizeof(rk_plane_surface) + sizeof(rk_plane_velocity) + \
+                   sizeof(rk_plane_friction) + sizeof(rk_plane_recovery) +                   \
+                   sizeof(rk_plane_mobility) + sizeof(rk_plane_rounding)) +                  \
+              sizeof(rk_local_head) +                                                        \
+              RK_MAX_LOCAL_BODIES *                                                          \
                   (sizeof(rk_local_body) + RK_MAX_CONTACT_PLANES * sizeof(rk_contact_plane))))
 #define RK_FRAME_ROOM (16384u - 32u) /* 6.2-2: what a frame's slot should have room for */
 #define RK_HAPTIC_HEALTH_BYTES \
@@ -694,15 +702,17 @@ static inline enum rk_verdict rk_check_frame(rk_frame* m) {
     const rk_plane_friction* f = &m->friction[i];
     const double recovery_s = m->recovery[i].recovery_s;
     const double inverse_mass = m->mobility[i].inverse_mass;
+    const double radius = m->rounding[i].radius;
     double norm;
     if (p->pointer >= RK_MAX_POINTERS) return RK_BAD_IDENTITY;
     if (!rk_finite(p->point, 3) || !rk_finite_span(s, 0, sizeof *s) ||
         !rk_finite(m->velocity[i].velocity, 3) || !rk_finite_span(f, 0, sizeof *f) ||
-        !isfinite(recovery_s) || !isfinite(inverse_mass)) {
+        !isfinite(recovery_s) || !isfinite(inverse_mass) || !isfinite(radius)) {
       return RK_BAD_NUMBER;
     }
     if (s->stiffness < 0 || s->damping < 0 || f->static_friction < 0 || f->dynamic_friction < 0 ||
-        recovery_s < 0 || recovery_s > 10 || (inverse_mass < 0 && !rk_is_not_said(inverse_mass))) {
+        recovery_s < 0 || recovery_s > 10 || radius < 0 ||
+        (inverse_mass < 0 && !rk_is_not_said(inverse_mass))) {
       return RK_BAD_RANGE;
     }
     norm = rk_normalise(p->normal, 3);
@@ -830,6 +840,7 @@ static inline int rk_encode_frame(const rk_frame* m, uint64_t* words, rk_receive
   if (rk_any(m->friction, planes * sizeof m->friction[0])) blocks |= RK_FRAME_FRICTION;
   if (rk_any(m->recovery, planes * sizeof m->recovery[0])) blocks |= RK_FRAME_RECOVERY;
   if (rk_any_mobility(m)) blocks |= RK_FRAME_MOBILITY;
+  if (rk_any(m->rounding, planes * sizeof m->rounding[0])) blocks |= RK_FRAME_ROUNDING;
   rk_put(words, &at, &m->head, sizeof m->head);
   rk_put(words, &at, m->plane, planes * sizeof m->plane[0]);
   if ((blocks & RK_FRAME_SURFACES) != 0) {
@@ -853,6 +864,9 @@ static inline int rk_encode_frame(const rk_frame* m, uint64_t* words, rk_receive
   }
   if ((blocks & RK_FRAME_MOBILITY) != 0) {
     rk_put(words, &at, m->mobility, planes * sizeof m->mobility[0]);
+  }
+  if ((blocks & RK_FRAME_ROUNDING) != 0) {
+    rk_put(words, &at, m->rounding, planes * sizeof m->rounding[0]);
   }
   shape->used_bytes = at;
   shape->blocks = blocks;
@@ -888,7 +902,8 @@ static inline enum rk_verdict rk_decode_local(const uint64_t* words, uint32_t en
 static inline enum rk_verdict rk_decode_frame(const uint64_t* words, size_t room_bytes,
                                               const rk_received* r, rk_frame* m) {
   const uint32_t known = RK_FRAME_SURFACES | RK_FRAME_VELOCITIES | RK_FRAME_FRICTION |
-                         RK_FRAME_RECOVERY | RK_FRAME_LOCAL_BODIES | RK_FRAME_MOBILITY;
+                         RK_FRAME_RECOVERY | RK_FRAME_LOCAL_BODIES | RK_FRAME_MOBILITY |
+                         RK_FRAME_ROUNDING;
   const uint32_t end = r->used_bytes < room_bytes ? r->used_bytes : (uint32_t)room_bytes;
   rk_frame copy;
   size_t planes;
@@ -912,6 +927,10 @@ static inline enum rk_verdict rk_decode_frame(const uint64_t* words, size_t room
   if ((r->blocks & RK_FRAME_LOCAL_BODIES) != 0) verdict = rk_decode_local(words, end, &at, &copy);
   if (verdict == RK_SOUND && (r->blocks & RK_FRAME_MOBILITY) != 0 &&
       !rk_take(words, end, &at, copy.mobility, planes * sizeof copy.mobility[0])) {
+    verdict = RK_BAD_LENGTH;
+  }
+  if (verdict == RK_SOUND && (r->blocks & RK_FRAME_ROUNDING) != 0 &&
+      !rk_take(words, end, &at, copy.rounding, planes * sizeof copy.rounding[0])) {
     verdict = RK_BAD_LENGTH;
   }
   if (verdict == RK_SOUND && !rk_length_agrees(r, at, room_bytes, known)) verdict = RK_BAD_LENGTH;
@@ -1492,7 +1511,8 @@ static inline int rk_supersede(rk_segment* own, uint64_t* epoch) {
 }
 
 static inline uint16_t rk_type_version(uint32_t type_id) { /* 6 */
-  return type_id == RK_WORLD_FRAME || type_id == RK_HAPTIC_HEALTH ? 3 : 1;
+  if (type_id == RK_WORLD_FRAME) return 4;
+  return type_id == RK_HAPTIC_HEALTH ? 3 : 1;
 }
 
 /* Fills the private directory; the size of the whole segment, 0 if the streams cannot be. */

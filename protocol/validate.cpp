@@ -180,11 +180,11 @@ DecodeStatus Validate(WorldFrame& m) noexcept {
     Plane& p = m.planes[i];
     if (p.pointer >= kMaxPointers) return DecodeStatus::kIdentity;
     if (!AllFinite(p.point, p.stiffness, p.damping, p.velocity, p.static_friction,
-                   p.dynamic_friction, p.recovery_s, p.inverse_mass)) {
+                   p.dynamic_friction, p.recovery_s, p.inverse_mass, p.radius)) {
       return DecodeStatus::kNotFinite;
     }
     if (p.stiffness < 0 || p.damping < 0 || p.static_friction < 0 || p.dynamic_friction < 0 ||
-        p.recovery_s < 0 || p.recovery_s > kLongestRecovery ||
+        p.recovery_s < 0 || p.recovery_s > kLongestRecovery || p.radius < 0 ||
         (p.inverse_mass < 0 && p.inverse_mass != kMobilityNotSaid)) {
       return DecodeStatus::kRange;
     }

@@ -8,9 +8,9 @@
 namespace rikiseki::protocol {
 
 inline constexpr std::uint16_t kVersionMajor = 0;
-inline constexpr std::uint16_t kVersionMinor = 3;
+inline constexpr std::uint16_t kVersionMinor = 4;
 
 /// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
-inline constexpr std::uint64_t kLayoutHash = 0x2C03F6A567697CB9ULL;
+inline constexpr std::uint64_t kLayoutHash = 0xACAE8D32F68C7538ULL;
 
 }  // namespace rikiseki::protocol

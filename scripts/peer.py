@@ -34,8 +34,8 @@ import sys
 import threading
 import time
 
-VERSION = (0, 3)
-LAYOUT_HASH = 0x2C03F6A567697CB9  # 8.3
+VERSION = (0, 4)
+LAYOUT_HASH = 0xACAE8D32F68C7538  # 8.3
 MAGIC = int.from_bytes(b"RIKISEKI", "little")
 BYTE_ORDER = 0x01020304
 HEADER_BYTES = 4096
@@ -160,6 +160,7 @@ CONTACT_PLANE = Record("world.frame/contact_plane", "other_body:u32 other_genera
                        "normal:f64[3] gap:f64 friction:f64 other_velocity:f64[3] other_inverse_mass:f64 "
                        "impulse:f64[3] radius:f64")
 MOBILITY = Record("world.frame/plane_mobility", "inverse_mass:f64")
+ROUNDING = Record("world.frame/plane_rounding", "radius:f64")
 SCENE = Record("world.scene", "revision:u64 needs:u64 left_out:u64 gravity:f64[3] name:char[64] body_count:u32 "
                "collider_count:u32")
 SCENE_BODY = Record("world.scene/body", "body:u32 generation:u32 fixed:u32 collider_count:u32 name:char[64]")
@@ -348,6 +349,8 @@ def check_frame(m):
         demand(0 <= r["recovery_s"] <= 10, "recovery_s")
     for p in m["mobilities"]:
         demand(p["inverse_mass"] >= 0 or p == NOT_SAID, "inverse_mass")
+    for p in m["roundings"]:
+        demand(p["radius"] >= 0, "radius")
     if m["local"]:
         check_local(m["local"])
 
@@ -425,6 +428,7 @@ OWN_SURFACE = {"stiffness": 0.0, "damping": 0.0}
 NOT_MOVING, SMOOTH, OWN_RECOVERY = {"velocity": [0.0] * 3}, {"static_friction": 0.0, "dynamic_friction": 0.0}, \
     {"recovery_s": 0.0}
 NOT_SAID = {"inverse_mass": -1.0}
+FLAT = {"radius": 0.0}
 NO_JUMPS = {"frames": 0, "newest_jump": 0.0, "largest_jump": 0.0}
 NO_ENERGY = {"injected": 0.0, "dissipated": 0.0, "flagged": 0, "unstable": 0, "controller": 0}
 NO_FILE = {"sha256": [0] * 32, "path": bytes(224)}
@@ -439,7 +443,8 @@ WORLD_FRAME = Message(16, FRAME, [("planes", "plane_count", PLANE, 32)],
                        Block(4, "frictions", "plane_count", FRICTION, SMOOTH, 32),
                        Block(8, "recoveries", "plane_count", RECOVERY, OWN_RECOVERY, 32),
                        LocalBlock(),
-                       Block(32, "mobilities", "plane_count", MOBILITY, NOT_SAID, 32)], check_frame, version=3)
+                       Block(32, "mobilities", "plane_count", MOBILITY, NOT_SAID, 32),
+                       Block(64, "roundings", "plane_count", ROUNDING, FLAT, 32)], check_frame, version=4)
 HAPTIC_HEALTH_MESSAGE = Message(2, HAPTIC_HEALTH, (), [Block(1, "reconciliation", None, RECONCILIATION, NO_JUMPS),
                                                        Block(2, "energy", None, ENERGY, NO_ENERGY)],
                                 check_haptic_health, version=3)

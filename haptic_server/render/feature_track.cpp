@@ -32,7 +32,8 @@ bool IsSound(const protocol::Plane& plane) {
          plane.damping <= kLargestStiffness && IsPlace(ToVec3(plane.velocity)) &&
          plane.static_friction >= 0 && plane.static_friction <= kLargestFriction &&
          plane.dynamic_friction >= 0 && plane.dynamic_friction <= kLargestFriction &&
-         plane.recovery_s >= 0 && plane.recovery_s <= kLongestRecovery;
+         plane.recovery_s >= 0 && plane.recovery_s <= kLongestRecovery && plane.radius >= 0 &&
+         plane.radius <= kLargestCoordinate;
 }
 
 // Unit normals pass bit for bit.
@@ -48,6 +49,14 @@ double RecoveryTime(const protocol::Plane& plane) {
 bool SameFeature(const protocol::Plane& a, const protocol::Plane& b) {
   return a.pointer == b.pointer && a.body == b.body && a.generation == b.generation &&
          a.feature == b.feature;
+}
+
+// The plane that is tangent to a ball where a finger is; in its very centre, along `otherwise`.
+HalfSpace TangentAt(const Vec3& centre, double radius, const Vec3& finger, const Vec3& otherwise) {
+  const Vec3 from_centre = finger - centre;
+  const double length = from_centre.stableNorm();
+  const Vec3 normal = length > kZeroNormal ? Vec3(from_centre / length) : otherwise;
+  return {centre + radius * normal, normal};
 }
 
 HalfSpace InWorld(const Pose& pose_WB, const HalfSpace& plane_B) {
@@ -67,7 +76,9 @@ const protocol::LocalBody* FindLocal(const protocol::WorldFrame& frame,
 }  // namespace
 
 FeatureTrack::FeatureTrack(DisplayRule rule, std::int64_t period_ns)
-    : rule_(rule), period_ns_(period_ns) {}
+    : rule_(rule), period_ns_(period_ns) {
+  fingers_.fill(Vec3::Zero());
+}
 
 void FeatureTrack::Advance(std::int64_t ticks) noexcept {
   // n is below 1e10/1e3; beyond n more ticks change nothing, so j need not run on.
@@ -103,6 +114,10 @@ HalfSpace FeatureTrack::Interpolated(const Feature& feature) const noexcept {
   const Vec3& base_normal = extrapolate ? feature.last_normal : feature.previous_normal;
   HalfSpace shown;
   shown.point = base_point + s * (feature.last_point - feature.previous_point);
+  if (feature.last_normal == feature.previous_normal) {  // at rest, as without interpolation
+    shown.normal = feature.last_normal;
+    return shown;
+  }
   shown.normal = base_normal + s * (feature.last_normal - feature.previous_normal);
   const double length = shown.normal.norm();
   // Opposite normals meet in zero half-way: the newer one is as good as any, and a unit vector.
@@ -115,8 +130,14 @@ HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
   return feature.rides ? InWorld(feature.pose_WB, shown) : shown;
 }
 
+HalfSpace FeatureTrack::DisplayedTo(const Feature& feature, const Vec3& finger) const noexcept {
+  const HalfSpace shown = Displayed(feature);
+  const double radius = feature.identity.radius;
+  return radius > 0 ? TangentAt(shown.point, radius, finger, shown.normal) : shown;
+}
+
 bool FeatureTrack::IsPressed(const Feature& feature, const FingerState& finger) const noexcept {
-  const HalfSpace plane = Displayed(feature);
+  const HalfSpace plane = DisplayedTo(feature, finger.position);
   return plane.normal.dot(plane.point - finger.position) + finger.radius >
          feature.recovery * feature.recovery_left;
 }
@@ -136,6 +157,8 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
     feature.leaving = false;
     feature.last_point = WithoutDenormals(ToVec3(plane.point));
     feature.last_normal = WithoutDenormals(Unit(ToVec3(plane.normal)));
+    const FingerState& finger = fingers[plane.pointer];
+    if (plane.radius > 0) feature.last_point -= plane.radius * feature.last_normal;
     const protocol::LocalBody* local = FindLocal(frame, plane);
     const BodyState* copy = copies.Find(plane.body, plane.generation);
     feature.rides = local != nullptr && copy != nullptr;
@@ -158,6 +181,16 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
                           ? Interpolated(known)
                           : HalfSpace{known.last_point, known.last_normal};
       if (known.rides) now = InWorld(known.pose_WB, now);
+      // Of another roundness: goes on from what is shown to the finger now, at its foot.
+      if (known.identity.radius != plane.radius) {
+        if (known.identity.radius > 0) {
+          now = TangentAt(now.point, known.identity.radius, finger.position, now.normal);
+        }
+        if (plane.radius > 0) {
+          const double height = now.normal.dot(finger.position - now.point);
+          now.point = finger.position - (height + plane.radius) * now.normal;
+        }
+      }
       if (feature.rides) now = InWorld(feature.pose_WB.Inverse(), now);
       feature.previous_point = now.point;
       feature.previous_normal = now.normal;
@@ -167,9 +200,11 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
     } else {
       feature.previous_point = feature.last_point;
       feature.previous_normal = feature.last_normal;
-      const FingerState& finger = fingers[plane.pointer];
       const HalfSpace last{feature.last_point, feature.last_normal};
-      const HalfSpace shown = feature.rides ? InWorld(feature.pose_WB, last) : last;
+      HalfSpace shown = feature.rides ? InWorld(feature.pose_WB, last) : last;
+      if (plane.radius > 0) {
+        shown = TangentAt(shown.point, plane.radius, finger.position, shown.normal);
+      }
       const double depth = shown.normal.dot(shown.point - finger.position) + finger.radius;
       feature.recovery = depth > finger.allowed_depth ? depth - finger.allowed_depth : 0;
       feature.recovery_left = 1;
@@ -240,7 +275,7 @@ std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexc
     surface.strength = feature.strength;
     surface.fixed = feature.identity.inverse_mass == 0;
     surface.copied = feature.rides;
-    surface.plane = Displayed(feature);
+    surface.plane = DisplayedTo(feature, fingers_[surface.pointer]);
     const double below = feature.recovery * feature.recovery_left;
     if (below > 0) surface.plane.point -= below * surface.plane.normal;
     if (copy != nullptr) surface.velocity = copy->VelocityAt(surface.plane.point);

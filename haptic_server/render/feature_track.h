@@ -1,6 +1,7 @@
 // What the world sent becomes what is shown: features keep their identity from frame to frame and
 // move between frames by the display rule. Those of a body with a local copy ride on it: the rule
-// then acts in the body's frame. Paper 3.1 and 3.2; numerics 1; design decision 5.
+// then acts in the body's frame. A ball is shown by the plane that is tangent to it where the finger
+// is now, and the rule moves its centre. Paper 3.1 and 3.2; numerics 1; design decision 5.
 #pragma once
 
 #include <array>
@@ -49,18 +50,24 @@ class FeatureTrack {
   /// Forgets everything: the world is gone. // RT:
   void Clear() noexcept;
 
-  /// What is displayed in this tick; valid until the next call of a member. // RT:
+  /// What is displayed in this tick; valid until the next call of a member. Balls are shown to the
+  /// fingers of the last MoveFinger. // RT:
   std::span<const Surface> Surfaces(const LocalBodies& copies) noexcept;
+
+  /// Where a finger [m, W] is from now on. // RT:
+  void MoveFinger(std::uint32_t pointer, const Vec3& position) noexcept {
+    if (pointer < fingers_.size()) fingers_[pointer] = position;
+  }
 
   /// Whether the newest frame has a feature of this body near this pointer. // RT:
   bool Has(std::uint32_t body, std::uint32_t generation, std::uint32_t pointer) const noexcept;
 
  private:
   struct Feature {
-    protocol::Plane identity;  // and own stiffness
-    bool rides = false;        // points and normals below are in the body's frame, else in W
-    Pose pose_WB;              // where its copy was last
-    Vec3 previous_point, last_point;
+    protocol::Plane identity;         // and own stiffness
+    bool rides = false;               // points and normals below are in the body's frame, else in W
+    Pose pose_WB;                     // where its copy was last
+    Vec3 previous_point, last_point;  // of a ball: its centre
     Vec3 previous_normal, last_normal;
     double recovery = 0;       // m, how far below its place it started
     double recovery_left = 0;  // 1..0
@@ -71,8 +78,10 @@ class FeatureTrack {
   void FollowCopies(const LocalBodies& copies) noexcept;
   HalfSpace Interpolated(const Feature& feature) const noexcept;
   HalfSpace Displayed(const Feature& feature) const noexcept;
+  HalfSpace DisplayedTo(const Feature& feature, const Vec3& finger) const noexcept;
   bool IsPressed(const Feature& feature, const FingerState& finger) const noexcept;
 
+  std::array<Vec3, protocol::kMaxPointers> fingers_;
   DisplayRule rule_;
   std::int64_t period_ns_;
   double ticks_per_frame_ = 1;  // n

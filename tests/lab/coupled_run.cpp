@@ -12,6 +12,13 @@ namespace {
 
 constexpr std::uint64_t kEpoch = 1;  // of either side: neither ever restarts
 
+template <typename Work>
+double Timed(Work&& work) {
+  const std::int64_t start_ns = MonotonicNow();
+  work();
+  return Seconds(MonotonicNow() - start_ns);
+}
+
 }  // namespace
 
 CoupledRun::CoupledRun(const haptic::Settings& haptic_settings, haptic::Device& device,
@@ -30,7 +37,7 @@ CoupledRun::CoupledRun(const haptic::Settings& haptic_settings, haptic::Device& 
   if (latency_ticks < 0) throw std::invalid_argument("a frame cannot come before it was made");
   world_.BeginHapticEpoch(kEpoch);
   while (tick_ < 0) {
-    TickHaptic();
+    TickHaptic({});
     if (tick_ < 0) TickWorld(0);
   }
   // The first world tick covers a whole period, whatever its phase.
@@ -40,7 +47,7 @@ CoupledRun::CoupledRun(const haptic::Settings& haptic_settings, haptic::Device& 
   }
 }
 
-bool CoupledRun::Tick() {
+bool CoupledRun::Tick(const haptic::OperatorInput& wish) {
   const std::int64_t now_ns = tick_ * haptic_period_ns_;
   const bool due = now_ns >= world_due_ns_;
   while (world_due_ns_ <= now_ns) world_due_ns_ += world_period_ns_;
@@ -49,17 +56,23 @@ bool CoupledRun::Tick() {
     TickWorld(std::min(now_ns - world_clock_ns_, longest_advance_ns_));
     world_clock_ns_ = now_ns;
   }
-  TickHaptic();
+  TickHaptic(wish);
   return ticks;
 }
 
 void CoupledRun::TickWorld(std::int64_t advance_ns) {
-  if (lapped_) world_.Consume(haptic_tick_);
-  world_.Tick(Seconds(advance_ns), world_frame_);
+  if (lapped_) Consume();
+  effort_.world_s = consuming_s_ + Timed([&] { world_.Tick(Seconds(advance_ns), world_frame_); });
+  consuming_s_ = 0;
+  if (alter_) alter_(world_frame_);
   under_way_.push_back({tick_ + (tick_ < 0 ? 0 : latency_ticks_), world_frame_});
 }
 
-void CoupledRun::TickHaptic() {
+void CoupledRun::Consume() {
+  consuming_s_ += Timed([&] { world_.Consume(haptic_tick_); });
+}
+
+void CoupledRun::TickHaptic(const haptic::OperatorInput& wish) {
   const bool first = tick_ == -kMeetingTicks;
   const haptic::TickTime time{.start_ns = (tick_ + kMeetingTicks) * haptic_period_ns_,
                               .previous_duration_ns = first ? 0 : haptic_period_ns_,
@@ -70,9 +83,9 @@ void CoupledRun::TickHaptic() {
                                  .ready = true,
                                  .heartbeat_ns = heartbeat_ns_,
                                  .frame = arrives ? &under_way_.front().frame : nullptr};
-  haptic_.Tick(time, world, haptic_tick_);
+  effort_.haptic_s = Timed([&] { haptic_.Tick(time, world, haptic_tick_, wish); });
   if (arrives) under_way_.pop_front();
-  if (!lapped_) world_.Consume(haptic_tick_);
+  if (!lapped_) Consume();
   ++tick_;
 }
 

@@ -6,7 +6,9 @@
 
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <memory>
+#include <utility>
 
 #include "haptic_server/device/device.h"
 #include "haptic_server/settings.h"
@@ -47,7 +49,10 @@ class CoupledRun {
   /// One haptic tick, with the world tick before it if that is due. Returns whether it was. A world
   /// tick advances the world to the time of the haptic ticks that it consumed; the first one, by
   /// the world's whole period.
-  bool Tick();
+  bool Tick(const haptic::OperatorInput& wish = {});
+
+  /// From now on every frame is altered on its way to the haptic side.
+  void AlterFrames(std::function<void(protocol::WorldFrame&)> alter) { alter_ = std::move(alter); }
 
   /// A silent world misses its ticks, shows no frame and no sign of life; afterwards it goes on
   /// where it stopped, and makes up for at most the gap of its settings.
@@ -60,6 +65,14 @@ class CoupledRun {
   const protocol::WorldFrame& world_frame() const { return world_frame_; }
   const world::WorldStep& world() const { return world_; }
 
+  /// How long this computer worked on the last haptic tick, and on the last world tick with what it
+  /// consumed, by the wall clock. For studies of cost alone: no result may depend on it.
+  struct Effort {
+    double haptic_s = 0;
+    double world_s = 0;
+  };
+  const Effort& effort() const { return effort_; }
+
  private:
   struct Sent {
     std::int64_t shown_in = 0;  // haptic tick
@@ -67,7 +80,8 @@ class CoupledRun {
   };
 
   void TickWorld(std::int64_t advance_ns);
-  void TickHaptic();
+  void TickHaptic(const haptic::OperatorInput& wish);
+  void Consume();
 
   std::int64_t haptic_period_ns_;
   std::int64_t world_period_ns_;
@@ -83,6 +97,9 @@ class CoupledRun {
   protocol::HapticTick haptic_tick_;
   protocol::WorldFrame world_frame_;
   bool lapped_ = false;
+  std::function<void(protocol::WorldFrame&)> alter_;
+  Effort effort_;
+  double consuming_s_ = 0;  // since the last world tick
   std::deque<Sent> under_way_;
 };
 

@@ -171,4 +171,18 @@ TEST_CASE("haptic_lab says when it cannot write") {
   CHECK(Contains(ended.output, "/no/such/folder/out.csv: cannot be written"));
 }
 
+TEST_CASE(
+    "haptic_lab tells what the features of a scene cost, and that leaving them out changes "
+    "nothing") {
+  const Ended ended = Run("scene-cost --quick --jobs 1");
+  CHECK(ended.exit_code == 0);
+  CHECK(Contains(ended.output, "push.sdf"));
+  CHECK(Contains(ended.output, "finger friction"));
+  CHECK(Contains(ended.output, "identical"));
+  const TemporaryFile table("scene,feature,repetitions\npush.sdf,smell,1\n");
+  const Ended wrong = Run("scene-cost --cases " + table.path());
+  CHECK(wrong.exit_code == 78);
+  CHECK(Contains(wrong.output, ":2: feature = smell: one of finger friction, "));
+}
+
 }  // namespace rikiseki::lab

@@ -14,6 +14,7 @@
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/pushes.h"
+#include "tests/lab/scene_cost.h"
 #include "tests/lab/slides.h"
 #include "tests/lab/study.h"
 #include "tests/lab/wall.h"
@@ -23,8 +24,8 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Buzz(),   Extremes(), Fig6(), MultirateMasses(), MultirateGrowth(), Planes(),
-          Pushes(), Slides(),   Wall()};
+  return {Buzz(),   Extremes(), Fig6(),      MultirateMasses(), MultirateGrowth(),
+          Planes(), Pushes(),   SceneCost(), Slides(),          Wall()};
 }
 
 struct Options {

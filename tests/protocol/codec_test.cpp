@@ -101,6 +101,8 @@ TEST_CASE("a message is as long as what it uses") {
   grows_by(136, 31);
   frame.planes[5].inverse_mass = 0;  // "it cannot move" is no default
   grows_by(32 * 8, 31 | kFrameMobility);
+  frame.planes[2].radius = 1;
+  grows_by(32 * 8, 31 | kFrameMobility | kFrameRounding);
   frame.local_body_count = kMaxLocalBodies;
   for (LocalBody& body : frame.local_bodies) body.contact_count = kMaxContactPlanes;
   CHECK(Encode(frame, words).used_bytes == kWorldFrameBytes);
@@ -346,6 +348,9 @@ TEST_CASE("a nonsensical frame is refused") {
           {"mobility below not said",
            [](auto& m) { m.planes[1].inverse_mass = std::nextafter(kMobilityNotSaid, -2); },
            S::kRange},
+          {"rounding", [](auto& m) { m.planes[1].radius = kNaN; }, S::kNotFinite},
+          {"rounding infinite", [](auto& m) { m.planes[1].radius = kInfinity; }, S::kNotFinite},
+          {"rounding < 0", [](auto& m) { m.planes[1].radius = -1e-9; }, S::kRange},
       });
 }
 
@@ -411,8 +416,9 @@ TEST_CASE("counts within the block of local bodies bound what is read") {
   const Encoded right = Encode(sound, words);
   const std::uint32_t contacts_sent =
       sound.local_bodies[0].contact_count + sound.local_bodies[1].contact_count;
-  const std::uint32_t mobilities = (right.blocks & kFrameMobility) != 0 ? 8 * sound.plane_count : 0;
-  const std::uint32_t local = right.used_bytes - mobilities - 16 - 2 * 224 - 136 * contacts_sent;
+  const std::uint32_t behind = ((right.blocks & kFrameMobility) != 0 ? 8 * sound.plane_count : 0) +
+                               ((right.blocks & kFrameRounding) != 0 ? 8 * sound.plane_count : 0);
+  const std::uint32_t local = right.used_bytes - behind - 16 - 2 * 224 - 136 * contacts_sent;
   const auto with = [&](std::uint32_t offset, std::uint32_t value, Encoded encoded) {
     Words spoiled = words;
     std::memcpy(reinterpret_cast<char*>(spoiled.data()) + offset, &value, sizeof value);
@@ -435,7 +441,7 @@ TEST_CASE("counts within the block of local bodies bound what is read") {
           DecodeStatus::kLength);
   }
   // Behind the block that this version knows last, a later one may put more.
-  CHECK(with(local, 2, {right.used_bytes + 40, right.blocks | 64}) == DecodeStatus::kOk);
+  CHECK(with(local, 2, {right.used_bytes + 40, right.blocks | 128}) == DecodeStatus::kOk);
 }
 
 TEST_CASE("a frame that says no mobility leaves every plane's not said, and 0 is not the same") {

@@ -118,7 +118,7 @@ WorldFrame FixtureFrame() {
   for (std::uint32_t i = 0; i < m.plane_count; ++i) {
     m.planes[i] = {i,           next.Small(), next.Small(), next.Small(),  next.Triple(),
                    kDirection,  next.Real(),  next.Real(),  next.Triple(), next.Real(),
-                   next.Real(), 0.25,         next.Real()};
+                   next.Real(), 0.25,         next.Real(),  next.Real()};
   }
   m.local_body_count = 2;
   m.local_substep_ns = 1'000'000;

@@ -67,7 +67,7 @@ void CheckHolds(const PeerView& view, const Message& expected) {
 }
 
 TEST_CASE("a frozen haptic segment of this version attaches and decodes") {
-  const Thawed segment("haptic-0.3.bin", Role::kHaptic);
+  const Thawed segment("haptic-0.4.bin", Role::kHaptic);
   const AttachResult result = AttachTo(segment, Role::kHaptic);
   INFO(result.text);
   REQUIRE(result.status == AttachStatus::kAttached);
@@ -77,7 +77,7 @@ TEST_CASE("a frozen haptic segment of this version attaches and decodes") {
 }
 
 TEST_CASE("a frozen world segment of this version attaches and decodes") {
-  const Thawed segment("world-0.3.bin", Role::kWorld);
+  const Thawed segment("world-0.4.bin", Role::kWorld);
   const AttachResult result = AttachTo(segment, Role::kWorld);
   INFO(result.text);
   REQUIRE(result.status == AttachStatus::kAttached);
@@ -99,13 +99,13 @@ TEST_CASE("a frozen world segment of this version attaches and decodes") {
 }
 
 TEST_CASE("older segments are refused: under major 0 the minor version must be equal") {
-  for (const char* minor : {"1", "2"}) {
+  for (const char* minor : {"1", "2", "3"}) {
     for (const Role role : {Role::kHaptic, Role::kWorld}) {
       const Thawed segment(std::string(RoleName(role)) + "-0." + minor + ".bin", role);
       const AttachResult result = AttachTo(segment, role);
       CHECK(result.status == AttachStatus::kIncompatible);
       CHECK_THAT(result.text, Catch::Contains(std::string("version_minor is ") + minor +
-                                              ", this program knows 3"));
+                                              ", this program knows 4"));
     }
   }
 }

@@ -159,6 +159,7 @@ static const struct {
     FIELD("world.frame/contact_plane", rk_contact_plane, impulse, "f64[3]"),
     FIELD("world.frame/contact_plane", rk_contact_plane, radius, "f64"),
     FIELD("world.frame/plane_mobility", rk_plane_mobility, inverse_mass, "f64"),
+    FIELD("world.frame/plane_rounding", rk_plane_rounding, radius, "f64"),
     FIELD("world.health", rk_world_health, frames, "u64"),
     FIELD("world.health", rk_world_health, period_ns, "u64"),
     FIELD("world.health", rk_world_health, missed, "u64"),

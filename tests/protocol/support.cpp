@@ -177,6 +177,8 @@ WorldFrame Generator::Frame() {
     constexpr double kSaid[] = {0, kMobilityNotSaid};
     m.planes[i].inverse_mass = Integer(1) == 1 ? Positive() : kSaid[Integer(1)];
   }
+  const bool round = Integer(1) == 1;
+  for (std::uint32_t i = 0; round && i < m.plane_count; ++i) m.planes[i].radius = Positive();
   if (Integer(1) == 1) {
     m.local_body_count = 1 + Small(kMaxLocalBodies - 1);
     m.local_substep_ns = 1 + Integer(10'000'000);

@@ -104,6 +104,9 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
                          .inverse_mass = Mobility(scene_body, state, point, normal)};
+          if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
+            found.plane.radius = ball->radius;
+          }
           if (finger.friction > 0 && collider.friction > 0) {
             const double static_friction = collider.static_friction.value_or(collider.friction);
             found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);

@@ -105,6 +105,81 @@ TEST_CASE("a world faster than the haptic loop, and a fractional n") {
   REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == 1);
 }
 
+TEST_CASE("a ball is shown by the plane tangent to it where the finger is now") {
+  constexpr double kRadius = 0.03;
+  const Vec3 centre(0.1, -0.2, 0.05);
+  const auto ball = [&](const Vec3& direction) {
+    const Vec3 normal = direction.normalized();
+    protocol::Plane plane = PlaneAt(1, centre + kRadius * normal, normal);
+    plane.radius = kRadius;
+    return plane;
+  };
+  for (const DisplayRule rule :
+       {DisplayRule::kInterpolate, DisplayRule::kHold, DisplayRule::kExtrapolate}) {
+    FeatureTrack track(rule, kPeriodNs);
+    track.Receive(Frame({ball({1, 0, 0})}), kFarFinger, kNoCopies);
+    for (int tick = 0; tick < 150; ++tick) {
+      // Frames tell of the finger's direction long ago, and come early and late.
+      if (tick == 40 || tick == 100) {
+        track.Receive(Frame({ball({std::cos(0.01 * tick), std::sin(0.01 * tick), 0})}), kFarFinger,
+                      kNoCopies);
+      }
+      const Vec3 direction(std::cos(0.02 * tick), std::sin(0.02 * tick), 0);
+      track.MoveFinger(0, centre + 0.038 * direction);
+      const HalfSpace shown = track.Surfaces(kNoCopies)[0].plane;
+      REQUIRE((shown.normal - direction).norm() < 1e-14);
+      REQUIRE((shown.point - (centre + kRadius * direction)).norm() < 1e-15);
+      track.Advance(1);
+    }
+  }
+
+  // The rule moves its centre, from what is shown now on.
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.MoveFinger(0, centre + Vec3(0, 0, 0.04));
+  track.Receive(Frame({ball({1, 0, 0})}), kFarFinger, kNoCopies);
+  track.Advance(50);
+  protocol::Plane moved = ball({0, 1, 0});
+  moved.point = ToArray(Vec3(ToVec3(moved.point) + Vec3(0, 0, 0.01)));
+  track.Receive(Frame({moved}), kFarFinger, kNoCopies);
+  track.Advance(20);
+  CHECK(track.Surfaces(kNoCopies)[0].plane.point.z() == Approx(centre.z() + kRadius + 0.004));
+  // In its very centre there is a normal all the same.
+  track.MoveFinger(0, centre + Vec3(0, 0, 0.004));
+  CHECK(track.Surfaces(kNoCopies)[0].plane.normal.norm() == Approx(1));
+}
+
+TEST_CASE("a surface that becomes round or flat goes on from what is shown to the finger") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  const std::array<FingerState, 1> finger = {FingerState{Vec3(0.03, 0, 0.038), 0.01, 1}};
+  track.MoveFinger(0, finger[0].position);
+  protocol::Plane plane = PlaneAt(1, Vec3(0, 0, 0.03), Vec3::UnitZ());
+  const auto shown = [&] { return track.Surfaces(kNoCopies)[0].plane; };
+  track.Receive(Frame({plane}), finger, kNoCopies);
+  track.Advance(50);
+  for (const double radius : {0.03, 0.05, 0.0}) {
+    const HalfSpace before = shown();
+    plane.radius = radius;
+    plane.normal = {0, 0.6, 0.8};
+    track.Receive(Frame({plane}), finger, kNoCopies);
+    const double gap = before.normal.dot(finger[0].position - before.point);
+    const HalfSpace after = shown();
+    CAPTURE(radius);
+    CHECK(after.normal.dot(finger[0].position - after.point) == Approx(gap).margin(1e-12));
+    CHECK((after.normal - before.normal).norm() < 1e-12);
+    track.Advance(50);
+  }
+}
+
+TEST_CASE("damaged roundings are ignored") {
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  for (const double radius : {-1.0, std::nan(""), 1e300}) {
+    protocol::Plane plane = PlaneAt(1, kPoint0, kNormal0);
+    plane.radius = radius;
+    track.Receive(Frame({plane}), kFarFinger, kNoCopies);
+    CHECK(track.Surfaces(kNoCopies).empty());
+  }
+}
+
 TEST_CASE("opposite normals give a finite unit normal at every tick") {
   for (const DisplayRule rule : {DisplayRule::kInterpolate, DisplayRule::kExtrapolate}) {
     FeatureTrack track(rule, kPeriodNs);

@@ -50,6 +50,17 @@ TEST_CASE("planes are tangent at the nearest points, nearest first") {
   CHECK(ToVec3(found.planes[1].normal) == Vec3(0, 0, 1));
 }
 
+TEST_CASE("a ball says its radius, a flat surface none") {
+  Scene scene = CubeOnFloor(0.3);
+  scene.bodies[1].colliders[0].shape = Sphere{0.03};
+  const Found found = Find(scene, {{.radius_m = 0.01, .position = {-0.055, 0, 0.03}}},
+                           {.radius_m = 0.05, .period_s = 0.05});
+  REQUIRE(found.count == 2);
+  CHECK(found.planes[0].body == 1);
+  CHECK(found.planes[0].radius == 0.03);
+  CHECK(found.planes[1].radius == 0);
+}
+
 TEST_CASE("the radius grows by the way of two periods at the relative speed") {
   const Scene scene = CubeOnFloor(0.3);
   Finger finger{.radius_m = 0.01, .position = {-0.5, 0, 0.5}};  // 0.49 m above the floor

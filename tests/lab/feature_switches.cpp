@@ -1,0 +1,191 @@
+#include "tests/lab/feature_switches.h"
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <span>
+
+#include "haptic_server/render/feature_track.h"
+
+namespace rikiseki::lab {
+namespace {
+
+// Changes every plane of every frame on its way.
+FeatureSwitch::Change EachPlane(std::function<void(protocol::Plane&)> change) {
+  return [change](Touch& touch) {
+    touch.alter_frame = [change](protocol::WorldFrame& frame) {
+      for (protocol::Plane& plane : std::span(frame.planes).first(frame.plane_count)) change(plane);
+    };
+  };
+}
+
+FeatureSwitch::Change All(std::vector<FeatureSwitch::Change> changes) {
+  return [changes](Touch& touch) {
+    for (const auto& change : changes) change(touch);
+  };
+}
+
+void NothingMoves(Touch& touch) {
+  for (world::SceneBody& body : touch.scene.bodies) body.fixed = true;
+}
+
+// The surfaces stay where they were first seen.
+void PlanesStay(Touch& touch) {
+  NothingMoves(touch);
+  const auto first = std::make_shared<protocol::WorldFrame>();
+  touch.alter_frame = [first](protocol::WorldFrame& frame) {
+    if (first->plane_count == 0) *first = frame;
+    frame.plane_count = first->plane_count;
+    frame.planes = first->planes;
+  };
+}
+
+FeatureSwitch::Change FingerFriction(double friction) {
+  return [friction](Touch& touch) { touch.world.features.finger_friction = friction; };
+}
+
+FeatureSwitch::Change StaticFriction(std::function<std::optional<double>(double)> of_dynamic) {
+  return [of_dynamic](Touch& touch) {
+    touch.world.features.finger_friction = 0.5;
+    for (world::SceneBody& body : touch.scene.bodies) {
+      for (world::Collider& collider : body.colliders) {
+        collider.static_friction = of_dynamic(collider.friction);
+      }
+    }
+  };
+}
+
+FeatureSwitch::Change Coupling(protocol::Coupling coupling) {
+  return [coupling](Touch& touch) { touch.world.coupling.coupling = coupling; };
+}
+
+FeatureSwitch::Change Rule(PositionRule rule) {
+  return [rule](Touch& touch) { touch.haptic.render.position_rule = rule; };
+}
+
+FeatureSwitch::Change Display(haptic::DisplayRule rule) {
+  return [rule](Touch& touch) { touch.haptic.render.display = rule; };
+}
+
+FeatureSwitch::Change Damping(double damping_ns_per_m, bool adhesion) {
+  return [=](Touch& touch) {
+    touch.haptic.render.damping_ns_per_m = damping_ns_per_m;
+    touch.haptic.render.adhesion = adhesion;
+  };
+}
+
+FeatureSwitch::Change Controller(bool on, double moving_mass_kg) {
+  return [=](Touch& touch) {
+    touch.haptic.render.damping_ns_per_m = 0;  // there is a leak to brake
+    touch.haptic.safety.passivity_controller = on;
+    touch.haptic.spidar.moving_mass_kg = moving_mass_kg;  // bounds the brake
+  };
+}
+
+FeatureSwitch::Change Replay(world::ReplayRule rule) {
+  return [rule](Touch& touch) { touch.world.coupling.replay = rule; };
+}
+
+FeatureSwitch::Change OwnStiffness(double stiffness_n_per_m, double damping_ns_per_m) {
+  return EachPlane([=](protocol::Plane& plane) {
+    plane.stiffness = stiffness_n_per_m;
+    plane.damping = damping_ns_per_m;
+  });
+}
+
+FeatureSwitch::Change Recovery(double recovery_s) {
+  return EachPlane([=](protocol::Plane& plane) { plane.recovery_s = recovery_s; });
+}
+
+// Every plane once more, for a pointer that the display does not have.
+void PlanesForAnother(Touch& touch) {
+  touch.alter_frame = [](protocol::WorldFrame& frame) {
+    const std::uint32_t count = std::min(frame.plane_count, protocol::kMaxPlanes / 2);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      frame.planes[count + i] = frame.planes[i];
+      frame.planes[count + i].pointer = 1;
+    }
+    frame.plane_count = 2 * count;
+  };
+}
+
+FeatureSwitch::Change Limits(double force_n, double slew_n_per_s, double speed_m_per_s) {
+  return [=](Touch& touch) {
+    touch.haptic.safety.force_cap_n = force_n;
+    touch.haptic.safety.slew_limit_n_per_s = slew_n_per_s;
+    touch.haptic.safety.speed_limit_m_per_s = speed_m_per_s;
+  };
+}
+
+FeatureSwitch::Change LightDamping(double damping_ns_per_m, double speed_m_per_s) {
+  return [=](Touch& touch) {
+    touch.haptic.safety.light_damping_ns_per_m = damping_ns_per_m;
+    touch.haptic.safety.speed_limit_m_per_s = speed_m_per_s;
+  };
+}
+
+FeatureSwitch::Change SoftStart(double soft_start_ms) {
+  return [=](Touch& touch) { touch.haptic.safety.soft_start_ms = soft_start_ms; };
+}
+
+void Mapped(Touch& touch) {
+  touch.haptic.mapping = {.origin_mm = Vec3(10, -20, 30),
+                          .rotation_deg = Vec3(0, 0, 30),
+                          .motion_scale = 2,
+                          .force_scale = 0.5};
+}
+
+void ClutchedOnce(Touch& touch) {
+  touch.clutches_first = true;
+}
+
+void AsItIs(Touch&) {}
+
+}  // namespace
+
+std::vector<FeatureSwitch> FeatureSwitches() {
+  constexpr auto kLocal = protocol::Coupling::kLocal;
+  constexpr auto kImpulse = protocol::Coupling::kImpulse;
+  constexpr auto kTicks = world::ReplayRule::kTicks;
+  constexpr auto kLump = world::ReplayRule::kLump;
+  constexpr auto kSecondOrder = PositionRule::kSecondOrder;
+  constexpr auto kSemiImplicit = PositionRule::kSemiImplicit;
+  constexpr auto kInterpolate = haptic::DisplayRule::kInterpolate;
+  constexpr auto kHold = haptic::DisplayRule::kHold;
+  const auto smooth = EachPlane([](protocol::Plane& plane) {  // the velocities stay
+    plane.static_friction = plane.dynamic_friction = 0;
+  });
+  const auto mobility_not_said = EachPlane([](protocol::Plane& plane) {
+    if (plane.inverse_mass > 0) plane.inverse_mass = protocol::kMobilityNotSaid;
+  });
+  const haptic::RenderSettings usual;
+  return {
+      {"finger friction", FingerFriction(0.5), All({FingerFriction(0.5), smooth}),
+       FingerFriction(0), true},
+      {"static friction", StaticFriction([](double dynamic) { return 2 * dynamic; }),
+       StaticFriction([](double dynamic) { return dynamic; }),
+       StaticFriction([](double) { return std::nullopt; }), true},
+      {"mapping and clutch", Mapped, ClutchedOnce, AsItIs, true},
+      {"local copies", Coupling(kLocal), All({NothingMoves, Coupling(kLocal)}),
+       All({NothingMoves, Coupling(kImpulse)}), true},
+      {"replay by ticks", Replay(kTicks), All({NothingMoves, Replay(kTicks)}),
+       All({NothingMoves, Replay(kLump)}), true},
+      {"second-order position", Rule(kSecondOrder), All({Coupling(kImpulse), Rule(kSecondOrder)}),
+       All({Coupling(kImpulse), Rule(kSemiImplicit)}), true},
+      {"interpolation", All({Coupling(kImpulse), Display(kInterpolate)}),
+       All({PlanesStay, Display(kInterpolate)}), All({PlanesStay, Display(kHold)}), true},
+      {"damping", Damping(5, false), Damping(0, true), Damping(0, false), true},
+      {"own stiffness", OwnStiffness(1000, 1),
+       OwnStiffness(usual.stiffness_n_per_m, usual.damping_ns_per_m), AsItIs, true},
+      {"recovery time", Recovery(0.3), Recovery(haptic::kRecoveryTime), AsItIs, false},
+      {"mobility", AsItIs, AsItIs, mobility_not_said, false},
+      {"another pointer", PlanesForAnother, PlanesForAnother, AsItIs, false},
+      {"passivity controller", Controller(true, 0.03), Controller(true, 0), Controller(false, 0),
+       true},
+      {"light damping", LightDamping(1, 0.01), LightDamping(1, 3), LightDamping(0, 3), true},
+      {"soft start", SoftStart(1000), SoftStart(200), SoftStart(0), true},
+      {"limits", Limits(0.5, 50, 3), Limits(1e6, 1e9, 1e6), Limits(1e9, 1e15, 1e9), true},
+  };
+}
+
+}  // namespace rikiseki::lab
