@@ -151,8 +151,7 @@ void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   frame.coupling = s.settings.coupling.coupling;
   const FeatureReach reach{.radius_m = s.settings.features.radius_mm * 1e-3,
                            .period_s = static_cast<double>(s.settings.period_ns()) * 1e-9};
-  frame.plane_count =
-      s.plane_finder->Find(s.states, s.generations, s.fingers, reach, frame.planes);
+  frame.plane_count = s.plane_finder->Find(s.states, s.generations, s.fingers, reach, frame.planes);
   if (s.settings.coupling.coupling == protocol::Coupling::kLocal) {
     frame.local_body_count = FindLocalBodies(s.scene, *s.dynamics, s.states, s.generations,
                                              std::span(frame.planes).first(frame.plane_count),

@@ -43,7 +43,7 @@ NearBodies::NearBodies(const Scene& scene) {
     }
     boxes.push_back(box);
   }
-  tree_ = BoxTree(boxes, 4);
+  tree_ = BoxTree(boxes, 1);
 }
 
 void NearBodies::Find(std::span<const BodyState> states, const Vec3& p, double radius_m,

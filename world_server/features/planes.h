@@ -53,9 +53,8 @@ class PlaneFinder {
   explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
 
   /// Fills `planes` nearest first, at most its length, and returns how many. Friction of finger and
-  /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise; where
-  /// there is none, neither it nor the material's velocity is filled in. `states` and `generations`
-  /// go with the scene's bodies; what cannot move is where the scene says.
+  /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise.
+  /// `states` and `generations` go with the scene's bodies; what cannot move is where the scene says.
   std::uint32_t Find(std::span<const BodyState> states, std::span<const std::uint32_t> generations,
                      std::span<const Finger> fingers, const FeatureReach& reach,
                      std::span<protocol::Plane> planes);

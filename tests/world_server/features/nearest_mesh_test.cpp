@@ -70,7 +70,7 @@ RawMesh RandomHullOf(int count, std::mt19937& random) {
   return raw;
 }
 
-// A sphere with dents and horns: far from convex, its corners sharp both ways.
+// A torus with dents and horns: far from convex, its corners sharp both ways.
 RawMesh Spiky() {
   RawMesh raw = test::Torus(0.1, 0.05, 24, 16);
   for (std::size_t i = 0; i < raw.corners.size(); ++i) {
@@ -182,7 +182,6 @@ TEST_CASE("extreme points: a finger at 1e8 m, denormal penetration") {
   }
 }
 
-// The floor's top is z = 0; the wall leans away from it, (-0.1, 0.2) from its foot.
 TEST_CASE("the corner of an L-shaped mesh is felt like two boxes") {
   // With an upright wall both parts are boxes, which reach through each other.
   const RawMesh raw =
@@ -256,8 +255,6 @@ TEST_CASE("features are the minima of the distance: complete, nearest first, cap
         }
       }
     }
-    // None is missing: walking downhill from anywhere on the surface ends at one of them. Starts
-    // whose end is nearly parallel to a nearer feature, or beyond the cap, are covered by that.
   }
   CHECK(most >= 3);
 }

@@ -2,6 +2,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -177,6 +178,46 @@ TEST_CASE("the nearest point of an ellipse section agrees with a fine scan") {
     best = std::min(best, std::hypot(0.3 * std::cos(angle) - p.x(), 0.2 * std::sin(angle) - p.z()));
   }
   CHECK(FindNearestPoint(ellipsoid, p).distance == Approx(best).epsilon(1e-8));
+}
+
+// Independent of Eberly's scaling: bisection of the secular equation, sum (e_i y_i / (e_i^2 + t))^2 = 1,
+// in long double, for its largest root.
+TEST_CASE("ellipsoids agree with bisection in long double") {
+  std::mt19937 random(8);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  for (const Vec3& radii : {Vec3(0.03, 0.05, 0.08), Vec3(0.05, 0.05, 0.02), Vec3(0.02, 0.3, 0.3),
+                            Vec3(0.5, 0.01, 0.02)}) {
+    for (int probe = 0; probe < 500; ++probe) {
+      Vec3 p = 1.5 * radii.cwiseProduct(Vec3(uniform(random), uniform(random), uniform(random)));
+      if (probe % 3 == 0) p *= std::pow(10.0, -(probe % 9));
+      long double least = std::numeric_limits<long double>::infinity();
+      for (const double radius : radii) least = std::min<long double>(least, radius);
+      const auto value = [&](long double t) {
+        long double sum = -1;
+        for (int i = 0; i < 3; ++i) {
+          const long double e = radii[i];
+          const long double term = e * static_cast<long double>(p[i]) / (e * e + t);
+          sum += term * term;
+        }
+        return sum;
+      };
+      long double low = -least * least, high = 10;
+      for (int i = 0; i < 300; ++i) {
+        const long double middle = (low + high) / 2;
+        (value(middle) > 0 ? low : high) = middle;
+      }
+      long double squared = 0;
+      for (int i = 0; i < 3; ++i) {
+        const long double e = radii[i];
+        const long double x = e * e * static_cast<long double>(p[i]) / (e * e + high);
+        squared += (x - p[i]) * (x - p[i]);
+      }
+      const auto expected = static_cast<double>(std::copysign(std::sqrt(squared), high));
+      const NearestPoint nearest = FindNearestPoint(Ellipsoid{radii}, p);
+      CAPTURE(radii.transpose(), p.transpose());
+      REQUIRE(std::abs(nearest.distance - expected) <= 1e-9 * radii.maxCoeff());
+    }
+  }
 }
 
 }  // namespace rikiseki::world
