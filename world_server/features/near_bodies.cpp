@@ -46,15 +46,17 @@ NearBodies::NearBodies(const Scene& scene) {
   tree_ = BoxTree(boxes, 1);
 }
 
+double NearBodies::WayOf(std::size_t body, const BodyState& state, double time_s) const {
+  const double turning = state.angular_velocity.norm();
+  return time_s * (state.velocity.norm() + (turning > 0 ? turning * radii_[body] : 0));
+}
+
 void NearBodies::Find(std::span<const BodyState> states, const Vec3& p, double radius_m,
                       double time_s, std::vector<std::size_t>& found) const {
   found.clear();
   for (const std::size_t body : one_by_one_) {
     const BodyState& state = states[body];
-    double reach = radii_[body] + radius_m;
-    const double speed = state.velocity.norm();
-    const double turning = state.angular_velocity.norm();
-    if (speed > 0 || turning > 0) reach += time_s * (speed + turning * radii_[body]);
+    const double reach = radii_[body] + radius_m + WayOf(body, state, time_s);
     if (!((state.pose.position - p).squaredNorm() > reach * reach)) found.push_back(body);
   }
   tree_.VisitNear(p, radius_m, [&](std::uint32_t item) { found.push_back(planted_[item]); });

@@ -22,11 +22,11 @@ class NearBodies {
   void Find(std::span<const BodyState> states, const Vec3& p, double radius_m, double time_s,
             std::vector<std::size_t>& found) const;
 
-  /// Radius of the ball about the body's centre of mass that holds it; infinite with a half-space.
-  double radius_m(std::size_t body) const { return radii_[body]; }
+  /// No point of the body's surface moves farther in `time_s` [m]; infinite where a half-space turns.
+  double WayOf(std::size_t body, const BodyState& state, double time_s) const;
 
  private:
-  std::vector<double> radii_;
+  std::vector<double> radii_;  // m, of the ball about the centre of mass that holds the body
   std::vector<std::size_t> one_by_one_;
   std::vector<std::size_t> planted_;  // the items of the tree
   BoxTree tree_;

@@ -69,10 +69,7 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
     for (const std::size_t body : bodies) {
       const SceneBody& scene_body = scene_.bodies[body];
       const BodyState& state = states[body];
-      const double body_way = scene_body.fixed
-                                  ? 0
-                                  : time_s * (state.velocity.norm() +
-                                              state.angular_velocity.norm() * near_.radius_m(body));
+      const double body_way = scene_body.fixed ? 0 : near_.WayOf(body, state, time_s);
       for (std::size_t place = 0; place < scene_body.colliders.size(); ++place) {
         const Collider& collider = scene_body.colliders[place];
         const Pose pose_WS = state.pose * collider.pose_BS;

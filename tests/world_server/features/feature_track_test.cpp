@@ -103,6 +103,7 @@ TEST_CASE("near bodies: none is missing, with a tree and without, moving and fix
       states[i].angular_velocity = 10 * Vec3::Random();
     }
     const NearBodies near(scene);
+    const double half_diagonal = 0.05 * std::sqrt(3.0) / 2;  // of a cube, its outer ball
     std::vector<std::size_t> found;
     for (int probe = 0; probe < 50; ++probe) {
       const Vec3 p = Vec3::Random();
@@ -114,13 +115,25 @@ TEST_CASE("near bodies: none is missing, with a tree and without, moving and fix
         const double way = scene.bodies[body].fixed
                                ? 0
                                : 0.1 * (states[body].velocity.norm() +
-                                        states[body].angular_velocity.norm() * near.radius_m(body));
+                                        states[body].angular_velocity.norm() * half_diagonal);
         const bool is_found = std::binary_search(found.begin(), found.end(), body);
         if (distance <= 0.1 + way) REQUIRE(is_found);
         if (body > 0 && distance > 0.2 + way) REQUIRE_FALSE(is_found);
       }
     }
   }
+}
+
+TEST_CASE("a half-space may be what moves: it is everywhere, and as near as its face") {
+  Scene scene;
+  scene.bodies.push_back(test::Cube(0.05, 0.1, 0.3, Vec3::Zero()));
+  scene.bodies[0].colliders[0].shape = HalfSpace{.normal = Vec3::UnitZ()};
+  const NearBodies near(scene);
+  const BodyState state{.velocity = Vec3(3, 0, 4)};
+  CHECK(near.WayOf(0, state, 0.1) == Approx(0.5));
+  std::vector<std::size_t> found;
+  near.Find(std::span(&state, 1), Vec3(1e6, 0, 0), 0.1, 0.1, found);
+  CHECK(found.size() == 1);
 }
 
 }  // namespace rikiseki::world
