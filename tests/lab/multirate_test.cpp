@@ -109,8 +109,10 @@ TEST_CASE("any loop grows as in the oracle, at any latency") {
       loop.method = FindLoopMethod(name).value();
       const double expected = oracle::Growth(rates);
       CAPTURE(i, name, rates.ticks, rates.latency, rates.mass, expected);
-      if (expected < 1e-3) continue;  // many numbers that die together are ill-conditioned
-      CHECK(std::log(Radius(loop, rates.mass)) == Approx(std::log(expected)).margin(1e-5));
+      if (expected < 1e-3) continue;  // many numbers that die together are ill-conditioned:
+      // two that do move by sqrt(rounding x the largest entry), 1e-5 for entries of 1e6.
+      const double margin = 1e-5 + 1e-5 / expected;
+      CHECK(std::log(Radius(loop, rates.mass)) == Approx(std::log(expected)).margin(margin));
     }
   }
 }
