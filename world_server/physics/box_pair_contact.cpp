@@ -33,7 +33,7 @@ class Algorithm final : public btCollisionAlgorithm {
       manifold_->setContactBreakingThreshold(kReach);
     }
     result->setPersistentManifold(manifold_);
-    for (const BoxBoxPoint& point :
+    for (const ContactPoint& point :
          FindBoxBoxContact(BoxOf(*body0), FromBullet(body0->getWorldTransform()), BoxOf(*body1),
                            FromBullet(body1->getWorldTransform()), kReach)) {
       result->addContactPoint(ToBullet(point.normal_W),

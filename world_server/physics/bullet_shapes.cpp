@@ -76,6 +76,18 @@ class MeshShape final : private MeshData, public btBvhTriangleMeshShape {
   }
 };
 
+class HullShape final : public btConvexHullShape {
+ public:
+  explicit HullShape(const TriangleMesh& hull) : faces_(hull) {
+    for (const Vec3& corner : hull.corners()) addPoint(ToBullet(corner), false);
+    recalcLocalAabb();
+  }
+  const Polyhedron& faces() const { return faces_; }
+
+ private:
+  Polyhedron faces_;
+};
+
 std::unique_ptr<btCollisionShape> Make(const Box& box) {
   return std::make_unique<btBoxShape>(ToBullet(box.half_extents));
 }
@@ -97,10 +109,7 @@ std::unique_ptr<btCollisionShape> Make(const Ellipsoid& ellipsoid) {
 }
 
 std::unique_ptr<btCollisionShape> Make(const Hull& hull) {
-  auto made = std::make_unique<btConvexHullShape>();
-  for (const Vec3& corner : hull.mesh->corners()) made->addPoint(ToBullet(corner), false);
-  made->recalcLocalAabb();
-  return made;
+  return std::make_unique<HullShape>(*hull.mesh);
 }
 std::unique_ptr<btCollisionShape> Make(const Mesh& mesh) {
   return std::make_unique<MeshShape>(*mesh.mesh);
@@ -117,6 +126,10 @@ std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape) {
     made->setMargin(kMargin);
   }
   return made;
+}
+
+const Polyhedron& FacesOf(const btConvexHullShape& hull) {
+  return static_cast<const HullShape&>(hull).faces();
 }
 
 }  // namespace rikiseki::world

@@ -6,12 +6,18 @@
 
 #include <memory>
 
+#include "world_server/geometry/polyhedron.h"
 #include "world_server/scene/scene.h"
+
+class btConvexHullShape;
 
 namespace rikiseki::world {
 
 /// In the shape's own frame; a half-space is a plane through the origin, a mesh is for bodies that
 /// cannot move. Holds all that it needs of `shape`.
 std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape);
+
+/// Of a hull that was made here.
+const Polyhedron& FacesOf(const btConvexHullShape& hull);
 
 }  // namespace rikiseki::world

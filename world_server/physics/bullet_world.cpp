@@ -13,6 +13,7 @@
 #include "world_server/physics/air.h"
 #include "world_server/physics/box_pair_contact.h"
 #include "world_server/physics/box_plane_contact.h"
+#include "world_server/physics/bullet_contacts.h"
 #include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_rebound.h"
@@ -58,6 +59,7 @@ struct BulletWorld::Engine {
   btCollisionDispatcher dispatcher{&configuration};
   BoxPlaneContact box_plane_contact{dispatcher};
   BoxPairContact box_pair_contact{dispatcher};
+  std::vector<PairContact> contacts = ReplaceContacts(dispatcher);
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;

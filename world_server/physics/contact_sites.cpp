@@ -79,7 +79,7 @@ bool FindNear(const Shape& shape, const Pose& pose_WS, const Shape& other, const
   } else if (const auto* half_space = std::get_if<HalfSpace>(&other)) {
     BoxNearHalfSpace(*box, pose_WS, *half_space, pose_WO, found);
   } else if (const auto* other_box = std::get_if<Box>(&other)) {
-    for (const BoxBoxPoint& point :
+    for (const ContactPoint& point :
          FindBoxBoxContact(*box, pose_WS, *other_box, pose_WO, reach_m)) {
       found.push_back({.point = point.point_W, .normal = point.normal_W, .gap = point.gap});
     }

@@ -15,9 +15,9 @@ Quat About(const Vec3& axis, double angle) {
   return Quat(Eigen::AngleAxisd(angle, axis.normalized()));
 }
 
-double LeastGap(const std::vector<BoxBoxPoint>& points) {
+double LeastGap(const std::vector<ContactPoint>& points) {
   double least = std::numeric_limits<double>::infinity();
-  for (const BoxBoxPoint& point : points) least = std::min(least, point.gap);
+  for (const ContactPoint& point : points) least = std::min(least, point.gap);
   return least;
 }
 
@@ -50,7 +50,7 @@ TEST_CASE("a cube on a larger one: its four lower corners, the normal upward") {
     const Pose cube{{0.05, -0.02, 0.08 + gap}, About(Vec3::UnitZ(), 0.3)};
     const auto points = FindBoxBoxContact(kCube, cube, table, {}, 0.01);
     REQUIRE(points.size() == 4);
-    for (const BoxBoxPoint& point : points) {
+    for (const ContactPoint& point : points) {
       CHECK((point.normal_W - Vec3::UnitZ()).norm() < 1e-12);
       CHECK(point.gap == Approx(gap).margin(1e-12));
       const Vec3 local = cube.Inverse() * point.point_W;
@@ -65,7 +65,7 @@ TEST_CASE("the larger one under the cube has its points where the cube's corners
   const Pose cube{{0.05, -0.02, 0.081}, About(Vec3::UnitZ(), 0.3)};
   const auto points = FindBoxBoxContact(table, {}, kCube, cube, 0.01);
   REQUIRE(points.size() == 4);
-  for (const BoxBoxPoint& point : points) {
+  for (const ContactPoint& point : points) {
     CHECK((point.normal_W + Vec3::UnitZ()).norm() < 1e-12);
     CHECK(point.gap == Approx(0.001).margin(1e-12));
     CHECK(point.point_W.z() == Approx(0.05).margin(1e-12));
@@ -81,7 +81,7 @@ TEST_CASE("a cube half over the edge stands on what is above the other") {
   REQUIRE(points.size() == 4);
   double least = 1;
   double most = -1;
-  for (const BoxBoxPoint& point : points) {
+  for (const ContactPoint& point : points) {
     CHECK(point.gap == Approx(0).margin(1e-12));
     CHECK(point.point_W.z() == Approx(0.03).margin(1e-12));
     least = std::min(least, point.point_W.x());
@@ -104,10 +104,11 @@ TEST_CASE("a corner over a face is one point as near as it is") {
     const auto points = FindBoxBoxContact(kCube, cube, kCube, {}, 0.005);
     const double least = LeastGap(points);
     CHECK(least == Approx(gap).margin(1e-12));
-    for (const BoxBoxPoint& point : points) CHECK((point.normal_W - Vec3::UnitZ()).norm() < 1e-12);
+    for (const ContactPoint& point : points) CHECK((point.normal_W - Vec3::UnitZ()).norm() < 1e-12);
     const auto reverse = FindBoxBoxContact(kCube, {}, kCube, cube, 0.005);
     CHECK(LeastGap(reverse) == Approx(gap).margin(1e-12));
-    for (const BoxBoxPoint& point : reverse) CHECK((point.normal_W + Vec3::UnitZ()).norm() < 1e-12);
+    for (const ContactPoint& point : reverse)
+      CHECK((point.normal_W + Vec3::UnitZ()).norm() < 1e-12);
   }
 }
 
@@ -155,7 +156,7 @@ TEST_CASE(
       REQUIRE(LeastGap(points) < 1e-9);
     }
     REQUIRE(points.size() <= 8);
-    for (const BoxBoxPoint& point : points) {
+    for (const ContactPoint& point : points) {
       REQUIRE(point.gap <= 0.02);
       REQUIRE(std::abs(point.normal_W.norm() - 1) < 1e-12);
       // On the surface of the first box, the plane through the second's surface opposite.
@@ -170,7 +171,7 @@ TEST_CASE(
     if (distance > 1e-6 && !points.empty()) {
       ++apart;
       // Nothing of the second is above the plane, nothing of the first below by more than the gap.
-      const BoxBoxPoint& point = points[0];
+      const ContactPoint& point = points[0];
       double lowest = std::numeric_limits<double>::infinity();
       double highest = -lowest;
       for (int corner = 0; corner < 8; ++corner) {
