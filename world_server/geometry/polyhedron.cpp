@@ -54,7 +54,8 @@ std::vector<std::uint32_t> Group(const TriangleMesh& mesh, std::vector<Polyhedro
 
 }  // namespace
 
-Polyhedron::Polyhedron(const TriangleMesh& hull) : corners(hull.corners()) {
+Polyhedron::Polyhedron(const TriangleMesh& hull)
+    : corners(hull.corners()), thinnest((hull.bounds().high - hull.bounds().low).minCoeff() / 2) {
   const std::vector<std::uint32_t> group = Group(hull, faces);
   // The border of each polygon, from corner to corner.
   std::vector<std::map<std::uint32_t, std::uint32_t>> next(faces.size());

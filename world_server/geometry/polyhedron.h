@@ -23,6 +23,7 @@ struct Polyhedron {
   std::vector<Vec3> corners;
   std::vector<Face> faces;
   std::vector<Edge> edges;
+  double thinnest = 0;  // m, the smallest half extent of its bounds
 
   /// Of a closed convex mesh. A triangle belongs to a neighbour's plane from which its corners are at
   /// most 1e-6 of the mesh's size away.

@@ -49,7 +49,7 @@ class Pair {
     if (hull_face_ > reach) return {};
     FindEdges();
     if (edges_ > reach) return {};
-    const double margin = kEdgeMargin * box_.half.minCoeff();
+    const double margin = kEdgeMargin * std::min(box_.half.minCoeff(), hull_.thinnest);
     if (edges_ > std::max(box_face_, hull_face_) + margin) {
       AddEdges();
     } else if (box_face_ >= hull_face_ - margin) {

@@ -80,7 +80,13 @@ TEST_CASE("a cylinder that slides on its flat face stops after v^2 / (2 mu g)") 
         const double exact = 4 / (2 * 0.5 * kGravity);
         CAPTURE(static_cast<int>(ground), substep, angle, way.norm() - exact,
                 world.State(1).pose.position.z());
-        CHECK(std::abs(way.head<2>().norm() - exact) < 1e-6);
+        // The substep in which it stops is not moved at all: mu g h^2 / 2 at most.
+        const double short_by = 0.5 * kGravity * substep * substep / 2;
+        CHECK(way.head<2>().norm() < exact + 1e-6);
+        CHECK(way.head<2>().norm() > exact - short_by - 1e-6);
+        CHECK(std::abs(way.y() * std::cos(angle) - way.x() * std::sin(angle)) < 1e-6);
+        CHECK(world.State(1).velocity.norm() < 1e-9);
+        CHECK(world.State(1).pose.position.z() == Approx(0.02).margin(1e-5));
       }
     }
   }
@@ -91,7 +97,8 @@ TEST_CASE("a cylinder and a hull below stiction do not creep") {
     for (const Shape& shape : {Shape(Cylinder{0.03, 0.02}), Shape(BoxHull({0.03, 0.03, 0.02})),
                                Shape(PillarHull(0.03, 0.02))}) {
       for (const double substep : {1e-3, 2e-3}) {
-        BulletWorld world(OnGround(ground, shape, 0.03, 0.02, 0.3, {.position = {0, 0, 0.02}}), substep);
+        BulletWorld world(OnGround(ground, shape, 0.03, 0.02, 0.3, {.position = {0, 0, 0.02}}),
+                          substep);
         Run(world, 1);
         const Vec3 start = world.State(1).pose.position;
         for (int i = 0; i < std::lround(5 / substep); ++i) {
@@ -150,7 +157,8 @@ TEST_CASE("a rolling cylinder keeps rolling") {
       CHECK(state.angular_velocity.y() == Approx(speed / radius).epsilon(1e-3));
       CHECK(state.pose.position.x() - start.x() == Approx(2 * speed).epsilon(1e-3));
       CHECK(std::abs(state.pose.position.y()) < 1e-6);
-      CHECK(state.pose.position.z() == Approx(radius).margin(1e-5));
+      // 1 slop deep: 1e-4 of the diameter of the ball round it, 0.1 m.
+      CHECK(state.pose.position.z() == Approx(radius - 1e-5).margin(1e-8));
     }
   }
 }
@@ -184,10 +192,12 @@ TEST_CASE("a cylinder or a hull that hits a box does not enter it, and keeps the
         for (int i = 0; i < 60; ++i) world.ApplyAndStep({}, kSubstep);
         CAPTURE(shape.index(), other_kg, offset, momentum().transpose(), angular().transpose());
         CHECK((momentum() - before).norm() < 1e-12);
-        CHECK((angular() - angular_before).norm() < 1e-6);
-        const double gap = world.State(0).pose.position.x() - world.State(1).pose.position.x();
-        CHECK(gap > 0.06 - 2e-5);
+        // Friction acts on each body on its own side of the gap, 0.6 mm before it closes: 1e-4 of the
+        // blow's moment, 3 mN m s.
+        CHECK((angular() - angular_before).norm() < 3e-6);
         if (offset == 0) {
+          const double gap = world.State(0).pose.position.x() - world.State(1).pose.position.x();
+          CHECK(gap > 0.06 - 2e-5);  // twice the depth at which they rest
           const double shared = 0.5 * 0.6 / (0.5 + other_kg);
           CHECK(world.State(0).velocity.x() == Approx(shared).epsilon(1e-3));
           CHECK(world.State(1).velocity.x() == Approx(shared).epsilon(1e-3));
