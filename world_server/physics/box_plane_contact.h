@@ -1,25 +1,16 @@
-// Contacts between a box and a half-space: the corners of the box's lowest face, all at once and
-// exact at every substep. Bullet's own routine finds one corner per substep and keeps old ones at
-// stale places, which costs a sliding box its stop distance and lets a fresh one rock.
+// Where a box touches or would touch a half-space: at the corners of its lowest face.
 #pragma once
 
-#include <BulletCollision/CollisionDispatch/btCollisionCreateFunc.h>
+#include <vector>
 
-#include <memory>
-
-class btCollisionDispatcher;
+#include "world_server/physics/contact_point.h"
+#include "world_server/scene/scene.h"
 
 namespace rikiseki::world {
 
-/// Replaces Bullet's routine for this pair, in both orders. Outlives the dispatcher's use of it.
-class BoxPlaneContact {
- public:
-  explicit BoxPlaneContact(btCollisionDispatcher& dispatcher);
-  ~BoxPlaneContact();
-
- private:
-  std::unique_ptr<btCollisionAlgorithmCreateFunc> box_first_;
-  std::unique_ptr<btCollisionAlgorithmCreateFunc> plane_first_;
-};
+/// Against the half-space normal . x <= offset (unit normal, W).
+std::vector<ContactPoint> FindBoxPlaneContact(const Box& box, const Pose& pose_WB,
+                                              const Vec3& normal_W, double offset_m,
+                                              double reach_m);
 
 }  // namespace rikiseki::world

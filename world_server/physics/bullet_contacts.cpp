@@ -3,6 +3,7 @@
 #include <btBulletCollisionCommon.h>
 
 #include "world_server/physics/box_box_contact.h"
+#include "world_server/physics/box_plane_contact.h"
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_shapes.h"
 #include "world_server/physics/cylinder_contact.h"
@@ -46,6 +47,13 @@ struct Plane {
   }
 };
 
+Points BoxOnPlane(const Object& first, const Object& second, double reach_m) {
+  const Plane plane(second);
+  return FindBoxPlaneContact(BoxOf(first), PoseOf(first), plane.normal, plane.offset, reach_m);
+}
+Points BoxOnBox(const Object& first, const Object& second, double reach_m) {
+  return FindBoxBoxContact(BoxOf(first), PoseOf(first), BoxOf(second), PoseOf(second), reach_m);
+}
 Points CylinderOnPlane(const Object& first, const Object& second, double reach_m) {
   const Plane plane(second);
   return FindCylinderPlaneContact(CylinderOf(first), PoseOf(first), plane.normal, plane.offset,
@@ -70,6 +78,8 @@ std::vector<PairContact> ReplaceContacts(btCollisionDispatcher& dispatcher) {
   const auto replace = [&](int first, int second, FindPairContact find) {
     replaced.emplace_back(dispatcher, first, second, find);
   };
+  replace(BOX_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, BoxOnPlane);
+  replace(BOX_SHAPE_PROXYTYPE, BOX_SHAPE_PROXYTYPE, BoxOnBox);
   replace(CYLINDER_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, CylinderOnPlane);
   replace(CYLINDER_SHAPE_PROXYTYPE, BOX_SHAPE_PROXYTYPE, CylinderOnBox);
   replace(CONVEX_HULL_SHAPE_PROXYTYPE, STATIC_PLANE_PROXYTYPE, HullOnPlane);

@@ -11,8 +11,6 @@
 
 #include "common/body_step.h"
 #include "world_server/physics/air.h"
-#include "world_server/physics/box_pair_contact.h"
-#include "world_server/physics/box_plane_contact.h"
 #include "world_server/physics/bullet_contacts.h"
 #include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
@@ -57,8 +55,6 @@ struct BulletWorld::Engine {
   // Members are destroyed from the last to the first: the world before what it points to.
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher{&configuration};
-  BoxPlaneContact box_plane_contact{dispatcher};
-  BoxPairContact box_pair_contact{dispatcher};
   std::vector<PairContact> contacts = ReplaceContacts(dispatcher);
   btDbvtBroadphase broadphase;
   btSequentialImpulseConstraintSolver solver;
