@@ -78,8 +78,7 @@ class SplitEnergy {
   void Remember(const protocol::WorldFrame& frame, const LocalBodies& copies) noexcept;
   double Judge(const Acked& acked, double moved) const noexcept;
   bool Taken(std::size_t slot, const Acked& acked, double& energy) const noexcept;
-  const Face* PushedFace(const Pushed& pushed, const Vec3& impulse) const noexcept;
-  const Face* DeepestFace(const Pushed& pushed, const Vec3& finger) const noexcept;
+  const Face* LowestFace(const Pushed& pushed, const Vec3& v, double point_share) const noexcept;
   Record& At(std::uint64_t tick) noexcept { return history_[tick & (history_.size() - 1)]; }
 
   PenaltyRule rule_;
