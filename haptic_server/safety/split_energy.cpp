@@ -88,7 +88,7 @@ bool SplitEnergy::Taken(std::size_t slot, const Acked& acked, double& energy) co
 
   const Face* before = nullptr;
   if (acked.frame.coupling == protocol::Coupling::kPosition) {
-    before = DeepestFace(pushed, acked.now.finger);
+    before = LowestFace(pushed, acked.now.finger, 1);  // where it is deepest
     if (before == nullptr) return false;
     const double depth =
         rule_.finger_radius_m - before->normal.dot(acked.now.finger - before->point);
@@ -97,7 +97,7 @@ bool SplitEnergy::Taken(std::size_t slot, const Acked& acked, double& energy) co
     const double period_s = static_cast<double>(acked.frame.period_ns) * 1e-9;
     impulse = -stiffness * depth * period_s * before->normal;
   } else {
-    before = PushedFace(pushed, impulse);
+    before = LowestFace(pushed, impulse, 0);  // what it presses most
     if (before == nullptr) return false;
   }
   const auto planes = std::span(acked.frame.planes).first(acked.frame.plane_count);
@@ -131,23 +131,14 @@ void SplitEnergy::Remember(const protocol::WorldFrame& frame, const LocalBodies&
   }
 }
 
-const SplitEnergy::Face* SplitEnergy::PushedFace(const Pushed& pushed,
-                                                 const Vec3& impulse) const noexcept {
-  const Face* best = nullptr;
-  for (const Face& face : std::span(faces_).first(face_count_)) {
-    if (face.body != pushed.body || face.generation != pushed.generation) continue;
-    if (best == nullptr || face.normal.dot(impulse) < best->normal.dot(impulse)) best = &face;
-  }
-  return best;
-}
-
-const SplitEnergy::Face* SplitEnergy::DeepestFace(const Pushed& pushed,
-                                                  const Vec3& finger) const noexcept {
+// Of the body's faces the one along whose normal `v - point_share * point` is least.
+const SplitEnergy::Face* SplitEnergy::LowestFace(const Pushed& pushed, const Vec3& v,
+                                                 double point_share) const noexcept {
   const Face* best = nullptr;
   double lowest = 0;
   for (const Face& face : std::span(faces_).first(face_count_)) {
     if (face.body != pushed.body || face.generation != pushed.generation) continue;
-    const double height = face.normal.dot(finger - face.point);
+    const double height = face.normal.dot(v - point_share * face.point);
     if (best == nullptr || height < lowest) {
       best = &face;
       lowest = height;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -33,7 +34,9 @@ class SplitEnergy {
 
   /// The work [J, on the user] of the surfaces of bodies without a copy, since the tick before. Once
   /// per tick, before Receive. // RT:
-  void Moved(double surface_work) noexcept { moved_ += surface_work; }
+  void Moved(double surface_work) noexcept {
+    if (std::isfinite(surface_work)) moved_ += surface_work;
+  }
 
   /// A frame of world `world_epoch` that is displayed from tick `tick` on. Returns what the bodies
   /// took with the kicks that it acknowledges, less what their displayed surfaces took from the
@@ -78,8 +81,7 @@ class SplitEnergy {
   void Remember(const protocol::WorldFrame& frame, const LocalBodies& copies) noexcept;
   double Judge(const Acked& acked, double moved) const noexcept;
   bool Taken(std::size_t slot, const Acked& acked, double& energy) const noexcept;
-  const Face* PushedFace(const Pushed& pushed, const Vec3& impulse) const noexcept;
-  const Face* DeepestFace(const Pushed& pushed, const Vec3& finger) const noexcept;
+  const Face* LowestFace(const Pushed& pushed, const Vec3& v, double point_share) const noexcept;
   Record& At(std::uint64_t tick) noexcept { return history_[tick & (history_.size() - 1)]; }
 
   PenaltyRule rule_;
