@@ -137,6 +137,55 @@ TEST_CASE("cylinders and hulls of every size rest at their own height") {
   }
 }
 
+// Bullet's own manifolds would take the corners of a small cube, 2 cm from each other at most, for one.
+TEST_CASE("small cubes stand on boxes as large ones do") {
+  for (const double edge : {1e-2, 0.1}) {
+    for (const double angle : {0.0, M_PI / 4}) {
+      Scene scene = test::CubeOnFloor(0.5, edge, 0.1);
+      scene.bodies.push_back(test::Cube(edge, 0.1, 0.5, {0.3 * edge, 0, 1.51 * edge}));
+      scene.bodies[2].pose_WB.orientation = Quat(Eigen::AngleAxisd(angle, Vec3::UnitZ()));
+      BulletWorld world(scene, kSubstep);
+      Run(world, 2);
+      const BodyState state = world.State(2);
+      const double slop = 1e-4 * std::sqrt(3) * edge;
+      CAPTURE(edge, angle, state.pose.position.transpose(), state.velocity.norm());
+      CHECK(std::abs(state.pose.position.z() - 1.5 * edge) <= 2.1 * slop);
+      CHECK(std::abs(state.pose.position.x() - 0.3 * edge) < 1e-3 * edge);
+      CHECK(state.pose.orientation.angularDistance(scene.bodies[2].pose_WB.orientation) < 1e-3);
+      CHECK(state.velocity.norm() < 1e-5);
+    }
+  }
+}
+
+// A coin on its rim, upright, and a hull on a corner: they fall onto a face and lie.
+TEST_CASE("what falls over comes to lie on a face") {
+  for (const Ground ground : {Ground::kPlane, Ground::kBox}) {
+    const std::vector<std::pair<Shape, double>> shapes = {{Cylinder{0.03, 0.004}, 0.004},
+                                                          {PillarHull(0.03, 0.004), 0.004}};
+    for (const auto& [shape, height] : shapes) {
+      Pose start{.position = {0, 0, 0.031}};
+      start.orientation = Quat(Eigen::AngleAxisd(1.2, Vec3(1, 0.3, 0).normalized()));
+      BulletWorld world(OnGround(ground, shape, 0.03, 0.004, 0.5, start), kSubstep);
+      double lowest = 1;
+      double most = 0;
+      for (int i = 0; i < 500; ++i) {
+        world.ApplyAndStep({}, 0.01);
+        const BodyState state = world.State(1);
+        lowest = std::min(lowest, state.pose.position.z());
+        const double energy = kGravity * state.pose.position.z() + state.velocity.squaredNorm() / 2;
+        most = std::max(most, energy);
+      }
+      const BodyState state = world.State(1);
+      CAPTURE(static_cast<int>(ground), shape.index(), state.pose.position.transpose(), lowest);
+      CHECK(state.pose.position.z() == Approx(height).margin(1.1e-4 * 0.0606));
+      CHECK(lowest > height - 2e-4);
+      CHECK(most < kGravity * 0.0315);  // it gains nothing
+      CHECK(state.velocity.norm() < 1e-6);
+      CHECK(state.angular_velocity.norm() < 1e-4);
+    }
+  }
+}
+
 TEST_CASE("a rolling cylinder keeps rolling") {
   for (const Ground ground : {Ground::kPlane, Ground::kBox}) {
     for (const double substep : {1e-3, 2e-3}) {
