@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "world_server/physics/box_faces.h"
 
@@ -159,14 +160,23 @@ class Pair {
       distance = found;
       best = i * spacing;
     }
+    constexpr double kGolden = 1 / std::numbers::phi;
     double low = best - spacing;
     double high = best + spacing;
-    constexpr double kGolden = 1 / std::numbers::phi;
+    double left = high - kGolden * (high - low);
+    double right = low + kGolden * (high - low);
+    double at_left = at(left).distance;
+    double at_right = at(right).distance;
     for (int i = 0; i < kRefinements; ++i) {
-      const double left = high - kGolden * (high - low);
-      const double right = low + kGolden * (high - low);
-      (at(left).distance < at(right).distance ? low : high) =
-          at(left).distance < at(right).distance ? left : right;
+      if (at_left < at_right) {
+        low = left;
+        left = std::exchange(right, low + kGolden * (high - low));
+        at_left = std::exchange(at_right, at(right).distance);
+      } else {
+        high = right;
+        right = std::exchange(left, high - kGolden * (high - low));
+        at_right = std::exchange(at_left, at(left).distance);
+      }
     }
     return at((low + high) / 2);
   }
