@@ -35,7 +35,8 @@ class SpidarPose {
   Fix Solve(const EightStrings& lengths, const Pose& start) const noexcept;
 
   /// The string that, if it alone is wrong, leaves the others in the best agreement. Eight lengths
-  /// for six unknowns single it out where it is off by much more than the others. // RT:
+  /// for six unknowns single it out where the residual is above rounding; in few poses a pose that
+  /// is wrong explains a string that is wrong by millimetres. // RT:
   SuspectString Suspect(const EightStrings& lengths, const Pose& start) const noexcept;
 
   /// How the strings hold the grip. // RT:
