@@ -73,7 +73,8 @@ bool IsRendering(protocol::ForceReason reason) {
 }
 
 // Logs what changed, for the tick may not; ends on SIGINT or SIGTERM.
-void Supervise(const Settings& settings, const HapticLoop& loop, protocol::PeerLink& link) {
+void Supervise(const Settings& settings, const Device& device, const HapticLoop& loop,
+               protocol::PeerLink& link) {
   protocol::ForceReason logged = protocol::ForceReason::kNoContact;
   HapticLoop::WorldMode mode;
   bool unstable = false;
@@ -94,7 +95,11 @@ void Supervise(const Settings& settings, const HapticLoop& loop, protocol::PeerL
     }
     const protocol::ForceReason reason = loop.reason();
     if (IsRendering(reason) && IsRendering(logged)) continue;
-    if (reason != logged) spdlog::info("force: {}", protocol::Sentence(reason));
+    if (reason != logged) {
+      spdlog::info("force: {}", protocol::Sentence(reason));
+      const std::string complaint = device.Complaint();
+      if (!complaint.empty()) spdlog::warn("device: {}", complaint);
+    }
     logged = reason;
   }
 }
@@ -149,7 +154,7 @@ int Run(int argc, char** argv) {
     if (keyboard.is_there()) {
       spdlog::info("keys: space or enter = emergency stop, e = enable again, c = clutch");
     }
-    Supervise(settings, loop, link);
+    Supervise(settings, *device, loop, link);
   } catch (...) {
     stop = true;
     throw;

@@ -40,6 +40,9 @@ class Device {
   virtual void Release() noexcept = 0;
 
   virtual std::string Name() const = 0;
+
+  /// What is known to be wrong while Read is a fault, for the log; else empty. From any thread.
+  virtual std::string Complaint() const { return ""; }
 };
 
 }  // namespace rikiseki::haptic

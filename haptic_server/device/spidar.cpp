@@ -1,7 +1,9 @@
 #include "haptic_server/device/spidar.h"
 
 #include <cmath>
+#include <iomanip>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -37,6 +39,7 @@ DeviceStatus Spidar::Read(std::int64_t now_ns, DeviceSample& sample) noexcept {
   const SpidarKinematics::Fix fix = kinematics_.Solve(lengths);
   if (!(fix.residual_m <= kSlipResidual) || !fix.position.allFinite()) {
     moving_ = false;
+    Blame(lengths);
     return DeviceStatus::kFault;
   }
   const double dt = Seconds(now_ns - read_ns_);
@@ -46,6 +49,9 @@ DeviceStatus Spidar::Read(std::int64_t now_ns, DeviceSample& sample) noexcept {
     const double weight = -std::expm1(-2 * std::numbers::pi * settings_.velocity_cutoff_hz * dt);
     velocity_ += weight * ((fix.position - position_) / dt - velocity_);
   }
+  wrong_string_.store({}, std::memory_order_relaxed);
+  if (fix.residual_m <= kSoundResidual || !located_) sound_position_ = fix.position;
+  located_ = true;
   moving_ = true;
   read_ns_ = now_ns;
   position_ = fix.position;
@@ -72,6 +78,26 @@ void Spidar::Release() noexcept {
   FourStrings tension;
   tension.fill(settings_.tension_min_n);
   board_->WriteTensions(tension);
+}
+
+// Once, when the strings first disagree: the longer ago the sound position, the less it tells.
+void Spidar::Blame(const PerString& lengths) noexcept {
+  if (!located_ || wrong_string_.load(std::memory_order_relaxed).number != 0) return;
+  const SuspectString suspect = kinematics_.Suspect(lengths, sound_position_);
+  wrong_string_.store(
+      {static_cast<std::int32_t>(suspect.string) + 1, static_cast<float>(1e3 * suspect.excess_m)},
+      std::memory_order_relaxed);
+}
+
+std::string Spidar::Complaint() const {
+  const WrongString wrong = wrong_string_.load(std::memory_order_relaxed);
+  if (wrong.number == 0) return "";
+  std::ostringstream text;
+  text << "string " << wrong.number << " seems " << std::fixed << std::setprecision(1)
+       << std::abs(wrong.excess_mm)
+       << (wrong.excess_mm > 0 ? " mm too long: it hangs slack or has slipped off"
+                               : " mm too short: it has slipped, or its encoder lost counts");
+  return text.str();
 }
 
 std::string Spidar::Name() const {

@@ -2,6 +2,8 @@
 // motor board. Watches that the strings agree with each other: a slack or slipped one is a fault.
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <memory>
 
 #include "haptic_server/device/device.h"
@@ -15,6 +17,9 @@ namespace rikiseki::haptic {
 /// string hangs slack or its pulley slipped. Quantisation accounts for less than one count.
 inline constexpr double kSlipResidual = 1e-3;
 
+/// Up to here [m] a position is sound: where the string that is found wrong later is judged from.
+inline constexpr double kSoundResidual = kSlipResidual / 4;
+
 class Spidar final : public Device {
  public:
   Spidar(const SpidarSettings& settings, std::unique_ptr<MotorBoard> board);
@@ -24,7 +29,19 @@ class Spidar final : public Device {
   void Release() noexcept override;
   std::string Name() const override;
 
+  /// Names the string that makes Read a fault, counted from 1 as the motors of the device file are.
+  std::string Complaint() const override;
+
  private:
+  // What Complaint says, for it is asked by another thread than Read.
+  struct WrongString {
+    std::int32_t number = 0;  // 0: none
+    float excess_mm = 0;
+  };
+  static_assert(std::atomic<WrongString>::is_always_lock_free);
+
+  void Blame(const PerString& lengths) noexcept;
+
   SpidarSettings settings_;
   std::unique_ptr<MotorBoard> board_;
   SpidarKinematics kinematics_;
@@ -33,6 +50,9 @@ class Spidar final : public Device {
   std::int64_t read_ns_ = 0;
   Vec3 position_ = Vec3::Zero();
   Vec3 velocity_ = Vec3::Zero();
+  bool located_ = false;  // there was a position before
+  Vec3 sound_position_ = Vec3::Zero();
+  std::atomic<WrongString> wrong_string_{WrongString()};
 };
 
 /// The device of the settings. Throws StartError if it cannot be had.

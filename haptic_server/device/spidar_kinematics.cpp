@@ -3,13 +3,15 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace rikiseki::haptic {
 namespace {
 
 constexpr int kMaxIterations = 3;
-constexpr double kConverged = 1e-13;  // m
+constexpr double kConverged = 1e-13;        // m
+constexpr std::size_t kNone = kMaxStrings;  // leaves out no string
 
 }  // namespace
 
@@ -49,16 +51,38 @@ SpidarKinematics::Fix SpidarKinematics::Solve(const PerString& lengths) const no
   for (std::size_t i = 0; i < count_; ++i) {
     mean_square += lengths[i] * lengths[i] / static_cast<double>(count_);
   }
-  Fix fix;
+  Vec3 start = Vec3::Zero();
   for (std::size_t i = 0; i < count_; ++i) {
-    fix.position += linear_[i] * (lengths[i] * lengths[i] - mean_square - motors_[i].squaredNorm() +
-                                  mean_motor_square_);
+    start += linear_[i] * (lengths[i] * lengths[i] - mean_square - motors_[i].squaredNorm() +
+                           mean_motor_square_);
   }
+  return Refine(lengths, start, kNone);
+}
+
+SuspectString SpidarKinematics::Suspect(const PerString& lengths,
+                                        const Vec3& expected) const noexcept {
+  SuspectString suspect;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Vec3 position = Refine(lengths, expected, i).position;
+    const double way = (position - expected).norm();
+    if (!(way < nearest)) continue;
+    nearest = way;
+    suspect = {i, lengths[i] - (motors_[i] - position).norm()};
+  }
+  return suspect;
+}
+
+SpidarKinematics::Fix SpidarKinematics::Refine(const PerString& lengths, const Vec3& start,
+                                               std::size_t left_out) const noexcept {
+  Fix fix;
+  fix.position = start;
   for (;;) {
     Mat3 normal_matrix = Mat3::Zero();
     Vec3 gradient = Vec3::Zero();
     fix.residual_m = 0;
     for (std::size_t i = 0; i < count_; ++i) {
+      if (i == left_out) continue;
       const Vec3 string = fix.position - motors_[i];
       const double length = std::max(string.norm(), 1e-9);
       const Vec3 direction = string / length;
@@ -69,7 +93,11 @@ SpidarKinematics::Fix SpidarKinematics::Solve(const PerString& lengths) const no
     }
     if (fix.iterations == kMaxIterations) return fix;
     const Vec3 step = normal_matrix.inverse() * gradient;
-    if (!step.allFinite() || step.norm() < kConverged) return fix;
+    if (!step.allFinite()) {  // a length is no number, which no maximum shows
+      fix.residual_m = std::numeric_limits<double>::infinity();
+      return fix;
+    }
+    if (step.norm() < kConverged) return fix;
     fix.position -= step;
     ++fix.iterations;
   }

@@ -14,6 +14,12 @@ inline constexpr std::size_t kMaxStrings = 8;
 /// One value per string; the first StringCount() count.
 using PerString = std::array<double, kMaxStrings>;
 
+/// A string whose length does not fit the others'.
+struct SuspectString {
+  std::size_t string = 0;
+  double excess_m = 0;  // measured too long (it hangs slack or slipped off) or, if < 0, too short
+};
+
 class SpidarKinematics {
  public:
   struct Fix {
@@ -38,7 +44,15 @@ class SpidarKinematics {
   /// memory. // RT:
   Fix Solve(const PerString& lengths) const noexcept;
 
+  /// The string that, if it alone is wrong, leaves the grip nearest to `expected` [m]. Four lengths
+  /// for three unknowns tell that one is wrong, never which one: leave out any, and the others
+  /// agree. So it is named by where the grip was before: rightly if it moved less since then than
+  /// the string is wrong. // RT:
+  SuspectString Suspect(const PerString& lengths, const Vec3& expected) const noexcept;
+
  private:
+  Fix Refine(const PerString& lengths, const Vec3& start, std::size_t left_out) const noexcept;
+
   std::size_t count_;
   std::array<Vec3, kMaxStrings> motors_;
   Vec3 mean_motor_;

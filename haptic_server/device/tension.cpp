@@ -15,6 +15,7 @@ using Vector4 = Eigen::Vector4d;
 constexpr double kFlat = 1e-9;            // the strings span no volume
 constexpr double kBoundRounding = 1e-12;  // relative, of tensions
 constexpr double kSameError = 1e-12;      // relative, of force errors that count as equal
+constexpr double kFarthestForce = 1e9;    // N, far beyond every motor: squares stay finite
 
 double Clamp(double tension, const TensionBounds& bounds) {
   return std::clamp(tension, bounds.min_n, bounds.max_n);
@@ -71,9 +72,10 @@ bool AllocateExactly(const Directions& directions, const Vec3& force, const Tens
   return true;
 }
 
-// Keeps the best of the candidates that AllocateNearest tries.
+// Keeps the best of the candidates that AllocateNearest tries. What it starts from is within the
+// bounds: directions that are no numbers make no candidate better than another.
 struct Best {
-  FourStrings tension{};
+  FourStrings tension;
   double error = std::numeric_limits<double>::infinity();
   double sum = std::numeric_limits<double>::infinity();
 
@@ -94,6 +96,7 @@ struct Best {
 FourStrings AllocateNearest(const Directions& directions, const Vec3& force,
                             const TensionBounds& bounds) {
   Best best;
+  best.tension.fill(bounds.min_n);
   for (unsigned at_max = 0; at_max < 16; ++at_max) {
     FourStrings corner;
     for (std::size_t i = 0; i < kTensionStrings; ++i) {
@@ -142,7 +145,9 @@ Vec3 StringForce(const Directions& directions, const FourStrings& tension) noexc
 
 TensionAllocation AllocateTensions(const Directions& directions, const Vec3& force,
                                    const TensionBounds& bounds) noexcept {
-  const Vec3 wanted = force.allFinite() ? force : Vec3::Zero();
+  Vec3 wanted = force.allFinite() ? force : Vec3::Zero();
+  const double size = wanted.stableNorm();
+  if (size > kFarthestForce) wanted *= kFarthestForce / size;
   TensionAllocation result;
   result.feasible = AllocateExactly(directions, wanted, bounds, result.tension);
   if (!result.feasible) {

@@ -7,12 +7,12 @@
 // The three numbers of a name are planes, local bodies, and whether the finger rubs.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <vector>
 
 #include "haptic_server/step.h"
+#include "tests/bench/tick_clock.h"
 #include "tests/haptic_server/test_device.h"
 
 namespace rikiseki::haptic {
@@ -59,23 +59,6 @@ protocol::LocalBody MakeCube(std::uint32_t body) {
     }
   }
   return cube;
-}
-
-using Clock = std::chrono::steady_clock;
-
-double Quantile(std::vector<double>& values, double q) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
-}
-
-// What two readings of the clock cost by themselves [us].
-double ClockCost() {
-  std::vector<double> idle;
-  for (int i = 0; i < 1000; ++i) {
-    const auto start = Clock::now();
-    idle.push_back(std::chrono::duration<double, std::micro>(Clock::now() - start).count());
-  }
-  return Quantile(idle, 0.5);
 }
 
 // The haptic loop with a finger that rests in a frame's planes, timed tick by tick.

@@ -126,11 +126,14 @@ TEST_CASE("haptic_lab meets the reference rows") {
   CHECK(Contains(pushes.output, "35 rows: 35 ok 0 missed 0 unstable 0 unsupported"));
 }
 
-TEST_CASE("haptic_lab runs planes, walls and both row formats of multirate") {
+TEST_CASE("haptic_lab runs planes, tensions, walls and both row formats of multirate") {
   const std::string data = RIKISEKI_SOURCE_DIR "/tests/data/";
   const Ended planes = Run("planes --cases " + data + "plane_cases.csv");
   CHECK(planes.exit_code == 0);
   CHECK(Contains(planes.output, "105 rows: 105 ok"));
+  const Ended tensions = Run("tensions --cases " + data + "spidar_tension_cases.csv");
+  CHECK(tensions.exit_code == 0);
+  CHECK(Contains(tensions.output, "120 rows: 120 ok"));
   const Ended growth = Run("multirate --cases " + data + "multirate_rho_samples.csv");
   CHECK(growth.exit_code == 0);
   CHECK(Contains(growth.output, "100 rows: 100 ok"));
@@ -144,7 +147,7 @@ TEST_CASE("haptic_lab runs planes, walls and both row formats of multirate") {
   const Ended neither = Run("multirate --cases " + data + "wall_kmax.csv");
   CHECK(neither.exit_code == 78);
   CHECK(Contains(neither.output, "wall_kmax.csv: the columns are of no row format of multirate"));
-  for (const char* grid : {"planes", "wall"}) {
+  for (const char* grid : {"planes", "tensions", "wall"}) {
     CAPTURE(grid);
     const Ended own = Run(std::string(grid) + " --quick --shard 1/4");
     CHECK(own.exit_code == 0);

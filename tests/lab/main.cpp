@@ -17,6 +17,7 @@
 #include "tests/lab/scene_cost.h"
 #include "tests/lab/slides.h"
 #include "tests/lab/study.h"
+#include "tests/lab/tensions.h"
 #include "tests/lab/wall.h"
 
 namespace rikiseki::lab {
@@ -25,7 +26,8 @@ namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
   return {Buzz(),   Extremes(), Fig6(),      MultirateMasses(), MultirateGrowth(),
-          Planes(), Pushes(),   SceneCost(), Slides(),          Wall()};
+          Planes(), Pushes(),   SceneCost(), Slides(),          Tensions(),
+          Wall()};
 }
 
 struct Options {

@@ -50,6 +50,32 @@ TEST_CASE("lengths rounded to counts leave at most 27 um within 0.15 m of the ce
   REQUIRE(worst_residual <= count_length);
 }
 
+TEST_CASE("no rounding to counts leaves more than 27 um within 0.15 m of the centre") {
+  // To first order the error is linear in the four rounding errors: it is largest where each is half
+  // a count, of either sign.
+  const double half_count = 0.5 * 2.92e-5;
+  const SpidarKinematics kinematics(kCube);
+  double worst = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const double z = 1 - 2 * (i + 0.5) / 4000;  // spread evenly, by the golden angle
+    const double across = std::sqrt(1 - z * z);
+    const Vec3 direction(across * std::cos(2.399963 * i), across * std::sin(2.399963 * i), z);
+    for (const double radius : {0.0, 0.075, 0.15}) {
+      const PerString exact = kinematics.Lengths(radius * direction);
+      for (unsigned signs = 0; signs < 8; ++signs) {  // all signs reversed reverse the error
+        PerString lengths = exact;
+        for (std::size_t string = 0; string < 4; ++string) {
+          lengths[string] += (signs >> string & 1U) != 0 ? half_count : -half_count;
+        }
+        worst = std::max(worst, (kinematics.Solve(lengths).position - radius * direction).norm());
+      }
+    }
+  }
+  CAPTURE(worst);
+  REQUIRE(worst <= 27e-6);
+  REQUIRE(worst >= 25.2e-6);  // at the centre: 3/4 of |d0 + d1 - d2 - d3| = 4/sqrt(3) half counts
+}
+
 TEST_CASE("more strings than four are used, the best fit is stationary") {
   std::vector<Vec3> motors = kCube;
   motors.push_back(Vec3(0.3, 0.1, 0.2));
@@ -77,6 +103,34 @@ TEST_CASE("a slipped string shows in the residual") {
   REQUIRE(kinematics.Solve(lengths).residual_m > 1e-3);
 }
 
+TEST_CASE("a string that slips or hangs slack is named, with its sign") {
+  const SpidarKinematics kinematics(kCube);
+  std::mt19937_64 random(4);
+  for (int i = 0; i < 5000; ++i) {
+    const Vec3 position = InBall(random, 0.15);
+    const Vec3 expected = position + InBall(random, 1e-3);
+    PerString lengths = kinematics.Lengths(position);
+    const std::size_t wrong = static_cast<std::size_t>(i) % 4;
+    const double excess = i % 8 < 4 ? 5e-3 : -5e-3;
+    lengths[wrong] += excess;
+    const SuspectString suspect = kinematics.Suspect(lengths, expected);
+    REQUIRE(suspect.string == wrong);
+    REQUIRE(std::abs(suspect.excess_m - excess) < 1e-9);  // the three others fix the grip
+  }
+}
+
+TEST_CASE("nothing but where the grip was tells which of four strings is wrong") {
+  const SpidarKinematics kinematics(kCube);
+  const Vec3 position(0.02, -0.03, 0.05);
+  PerString lengths = kinematics.Lengths(position);
+  lengths[2] += 5e-3;
+  // A grip at which three strings are right and the first one is wrong explains them as well.
+  const Vec3 other = position + 3.75e-3 * ((kCube[0] - position).normalized() -
+                                           (kCube[2] - position).normalized());
+  REQUIRE(kinematics.Suspect(lengths, other).string == 0);
+  REQUIRE(kinematics.Suspect(lengths, position).string == 2);
+}
+
 TEST_CASE("nonsense lengths give a bounded answer in bounded time") {
   const SpidarKinematics kinematics(kCube);
   for (const double length : {0.0, -1.0, 1e6, 1e-310}) {
@@ -85,8 +139,12 @@ TEST_CASE("nonsense lengths give a bounded answer in bounded time") {
     REQUIRE(kinematics.Solve(lengths).iterations <= 3);
   }
   PerString lengths{};
+  lengths = kinematics.Lengths(Vec3::Zero());
+  lengths[1] = std::nan("");
+  REQUIRE(kinematics.Solve(lengths).residual_m > 1);
   lengths.fill(std::nan(""));
   REQUIRE(kinematics.Solve(lengths).iterations <= 3);
+  REQUIRE(kinematics.Suspect(lengths, Vec3::Zero()).string < 4);
 }
 
 TEST_CASE("motors in a plane, too few or too many are refused") {

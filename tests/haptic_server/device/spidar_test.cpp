@@ -97,6 +97,58 @@ TEST_CASE("a slipped string and a silent board are faults, and pass") {
   REQUIRE(spidar.Read(4'000'000, sample) == DeviceStatus::kFault);
 }
 
+TEST_CASE("the SPIDAR names the string that slipped, until the strings agree again") {
+  auto owned = std::make_unique<ScriptedBoard>();
+  ScriptedBoard& board = *owned;
+  Spidar spidar(Cube(), std::move(owned));
+  DeviceSample sample;
+  std::int64_t now_ns = 0;
+  const auto read = [&](const Vec3& position, std::size_t wrong, std::int64_t excess_counts) {
+    board.counts = CountsAt(position);
+    board.counts[wrong] += excess_counts;
+    return spidar.Read(now_ns += 1'000'000, sample);
+  };
+  for (std::size_t wrong = 0; wrong < kTensionStrings; ++wrong) {
+    CAPTURE(wrong);
+    const std::string name = "string " + std::to_string(wrong + 1) + " seems ";
+    // All at once, in a hand that moves at 0.5 m/s.
+    for (int k = 0; k <= 100; ++k) {
+      REQUIRE(read(Vec3(0.0005 * k, 0, -0.01), wrong, 0) == DeviceStatus::kOk);
+    }
+    REQUIRE(spidar.Complaint().empty());
+    REQUIRE(read(Vec3(0.0505, 0, -0.01), wrong, 200) == DeviceStatus::kFault);  // 5.8 mm
+    // Of 5.85 mm; the others are right to a count.
+    const std::string complaint = spidar.Complaint();
+    REQUIRE(complaint.starts_with(name + "5."));
+    REQUIRE(complaint.ends_with(" mm too long: it hangs slack or has slipped off"));
+    // The name stays, whatever the hand does meanwhile.
+    REQUIRE(read(Vec3(-0.05, 0.07, 0), wrong, 300) == DeviceStatus::kFault);
+    REQUIRE(spidar.Complaint() == complaint);
+    // Slowly, a count in a millisecond, in a hand at rest.
+    const Vec3 rest(-0.03, 0.02, 0.04);
+    REQUIRE(read(rest, wrong, 0) == DeviceStatus::kOk);
+    REQUIRE(spidar.Complaint().empty());
+    std::int64_t slipped = 0;
+    while (read(rest, wrong, slipped) == DeviceStatus::kOk) --slipped;
+    // 1 mm of residual is some 3 or 4 mm of one string.
+    REQUIRE(slipped < -70);
+    REQUIRE(slipped > -200);
+    REQUIRE(spidar.Complaint().starts_with(name));
+    REQUIRE(spidar.Complaint().find("too short") != std::string::npos);
+    REQUIRE(read(rest, wrong, 0) == DeviceStatus::kOk);
+  }
+}
+
+TEST_CASE("a SPIDAR that starts with strings that disagree names none") {
+  auto owned = std::make_unique<ScriptedBoard>();
+  ScriptedBoard& board = *owned;
+  Spidar spidar(Cube(), std::move(owned));
+  DeviceSample sample;
+  board.counts[1] = 400;
+  REQUIRE(spidar.Read(0, sample) == DeviceStatus::kFault);
+  REQUIRE(spidar.Complaint().empty());
+}
+
 TEST_CASE("Write tells what the strings really display, Release lets go") {
   auto owned = std::make_unique<ScriptedBoard>();
   ScriptedBoard& board = *owned;

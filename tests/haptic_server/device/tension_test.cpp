@@ -61,8 +61,7 @@ double SmallestError(const Directions& directions, const Vec3& force, const Tens
 }
 
 TEST_CASE("tensions match the independent reference") {
-  const auto rows =
-      ReadCsv(RIKISEKI_SOURCE_DIR "/tests/data/haptic_server/spidar_tension_cases.csv");
+  const auto rows = ReadCsv(RIKISEKI_SOURCE_DIR "/tests/data/spidar_tension_cases.csv");
   REQUIRE(rows.size() == 120);
   for (const CsvRow& row : rows) {
     const auto number = [&](const char* column) { return std::stod(row.at(column)); };
@@ -139,8 +138,8 @@ TEST_CASE("degenerate strings and damaged forces still respect the bounds") {
   for (const Directions& directions :
        {Directions{x, x, x, x}, Directions{x, -x, Vec3::UnitY(), -Vec3::UnitY()},
         Directions{Vec3::Zero(), x, Vec3::UnitY(), Vec3::UnitZ()}}) {
-    for (const Vec3& force : {Vec3(1, 2, 3), Vec3(1e9, 0, 0), Vec3(std::nan(""), 0, 0),
-                              Vec3(0, INFINITY, 0), Vec3(1e-310, 0, 0)}) {
+    for (const Vec3& force : {Vec3(1, 2, 3), Vec3(1e9, 0, 0), Vec3(1e300, -1e308, 0),
+                              Vec3(std::nan(""), 0, 0), Vec3(0, INFINITY, 0), Vec3(1e-310, 0, 0)}) {
       const TensionAllocation got = AllocateTensions(directions, force, bounds);
       for (const double t : got.tension) {
         REQUIRE(t >= bounds.min_n);
@@ -149,6 +148,24 @@ TEST_CASE("degenerate strings and damaged forces still respect the bounds") {
       REQUIRE(got.force.allFinite());
     }
   }
+}
+
+TEST_CASE("directions that are no numbers leave the strings at their least") {
+  Directions directions = DirectionsAt({0.01, 0.02, 0.03});
+  directions[2] = Vec3::Constant(std::nan(""));
+  const TensionAllocation got = AllocateTensions(directions, Vec3(1, 2, 3), {0.5, 20});
+  REQUIRE(got.tension == FourStrings{0.5, 0.5, 0.5, 0.5});
+  REQUIRE_FALSE(got.feasible);
+}
+
+TEST_CASE("a force beyond all numbers pulls as one that is merely far too large") {
+  const Directions directions = DirectionsAt({0.01, 0.02, 0.03});
+  const TensionBounds bounds{0.5, 20};
+  const Vec3 along(1, -2, 0.5);
+  const TensionAllocation far = AllocateTensions(directions, 1e6 * along, bounds);
+  const TensionAllocation farther = AllocateTensions(directions, 1e300 * along, bounds);
+  REQUIRE(farther.tension == far.tension);
+  REQUIRE((far.force - 1e6 * along).norm() < 1e6 * along.norm());
 }
 
 }  // namespace

@@ -1,0 +1,57 @@
+// What no device of the daemon runs yet, the eight strings, and what happens rarely, on the 1 kHz
+// path: nothing is allocated, nothing locked.
+#include <catch2/catch.hpp>
+
+#include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/device/tension.h"
+#include "tests/haptic_server/device/g6x3.h"
+#include "tests/haptic_server/guard.h"
+
+namespace rikiseki::haptic {
+namespace {
+
+TEST_CASE("eight strings: pose, suspect and tensions allocate nothing and lock nothing") {
+  const SpidarPose kinematics(G6X3Motors(), G6X3Attachments());
+  std::mt19937_64 random(1);
+  const long allocations = test::Allocations();
+  const long locks = test::Locks();
+  double sum = 0;
+  for (int i = 0; i < 500; ++i) {
+    EightStrings lengths = kinematics.Lengths(RandomPose(random, 0.03, 0.5));
+    const Pose pose = kinematics.Solve(lengths, Pose()).pose;
+    lengths[static_cast<std::size_t>(i) % kGripStrings] += 5e-3;
+    sum += kinematics.Suspect(lengths, pose).excess_m;
+    const Wrench wrench{RandomInBall(random, i), RandomInBall(random, 0.01 * i)};
+    sum += AllocateWrench(kinematics.StringsAt(pose), wrench, kG6X3Bounds, 1).tension[0];
+  }
+  REQUIRE(test::Allocations() == allocations);
+  REQUIRE(test::Locks() == locks);
+  REQUIRE(sum > 0);
+}
+
+TEST_CASE("four strings: a suspect and forces out of reach allocate nothing and lock nothing") {
+  const double h = 0.265;
+  const SpidarKinematics kinematics(
+      {Vec3(-h, h, h), Vec3(h, h, -h), Vec3(-h, -h, -h), Vec3(h, -h, h)});
+  std::mt19937_64 random(2);
+  const long allocations = test::Allocations();
+  const long locks = test::Locks();
+  double sum = 0;
+  for (int i = 0; i < 500; ++i) {
+    const Vec3 position = RandomInBall(random, 0.15);
+    PerString lengths = kinematics.Lengths(position);
+    lengths[static_cast<std::size_t>(i) % kTensionStrings] += 5e-3;
+    sum += kinematics.Suspect(lengths, position).excess_m;
+    std::array<Vec3, kTensionStrings> directions;
+    for (std::size_t s = 0; s < kTensionStrings; ++s) {
+      directions[s] = (kinematics.motor(s) - position).normalized();
+    }
+    sum += AllocateTensions(directions, RandomInBall(random, i), {0.5, 20}).tension[0];
+  }
+  REQUIRE(test::Allocations() == allocations);
+  REQUIRE(test::Locks() == locks);
+  REQUIRE(sum > 0);
+}
+
+}  // namespace
+}  // namespace rikiseki::haptic
