@@ -10,7 +10,7 @@
 #include "common/logging.h"
 #include "common/realtime.h"
 #include "common/version.h"
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/usb/usb_device.h"
 #include "haptic_server/keyboard.h"
 #include "haptic_server/loop.h"
 #include "haptic_server/safety/stability.h"
@@ -78,6 +78,7 @@ void Supervise(const Settings& settings, const Device& device, const HapticLoop&
   protocol::ForceReason logged = protocol::ForceReason::kNoContact;
   HapticLoop::WorldMode mode;
   bool unstable = false;
+  std::string complaint;
   while (true) {
     const int signal = WaitForSignal(kSupervisorPollMs);
     if (signal == SIGINT || signal == SIGTERM) return;
@@ -93,21 +94,23 @@ void Supervise(const Settings& settings, const Device& device, const HapticLoop&
       unstable = !unstable;
       if (unstable) spdlog::warn("the contact is unstable: lower the stiffness or raise damping");
     }
-    const protocol::ForceReason reason = loop.reason();
-    if (IsRendering(reason) && IsRendering(logged)) continue;
-    if (reason != logged) {
-      spdlog::info("force: {}", protocol::Sentence(reason));
-      const std::string complaint = device.Complaint();
+    // Of a device that answers again, nothing is known to be wrong.
+    if (const std::string now = device.Complaint(); now != complaint) {
+      complaint = now;
       if (!complaint.empty()) spdlog::warn("device: {}", complaint);
     }
+    const protocol::ForceReason reason = loop.reason();
+    if (IsRendering(reason) && IsRendering(logged)) continue;
+    if (reason != logged) spdlog::info("force: {}", protocol::Sentence(reason));
     logged = reason;
   }
 }
 
 int Run(int argc, char** argv) {
   CatchOperatorSignals();
-  const DaemonOptions options = ParseDaemonOptions(
-      argc, argv, "haptic_server", kPurpose, {{"device", "simulated", "wins over device.kind"}});
+  const DaemonOptions options =
+      ParseDaemonOptions(argc, argv, "haptic_server", kPurpose,
+                         {{"device", "simulated|usb", "wins over device.kind"}});
   std::vector<std::string> overrides = options.set;
   if (!options.extra[0].empty()) overrides.push_back("device.kind=" + options.extra[0]);
   std::string description;
@@ -118,10 +121,12 @@ int Run(int argc, char** argv) {
   }
   if (options.check) {
     std::fputs(description.c_str(), stdout);
+    const std::string board = DescribeBoard(settings);
+    if (!board.empty()) std::printf("# device: %s\n", board.c_str());
     return kExitOk;
   }
   BlockSignals();
-  const std::unique_ptr<Device> device = MakeDevice(settings);
+  const std::unique_ptr<Device> device = OpenDevice(settings);
   const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
   protocol::SegmentOwner owner(
       {.instance = options.instance,

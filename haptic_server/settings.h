@@ -8,6 +8,7 @@
 #include "common/config.h"
 #include "common/geometry.h"
 #include "common/rigid_body.h"
+#include "haptic_server/device/usb/usb_settings.h"
 
 namespace rikiseki::haptic {
 
@@ -58,7 +59,7 @@ struct MappingSettings {
   double force_scale = 1;            // s_f, newtons at the device per newton in the world
 };
 
-enum class DeviceKind { kSimulated };
+enum class DeviceKind { kSimulated, kUsb };
 
 struct DeviceSettings {
   DeviceKind kind = DeviceKind::kSimulated;
@@ -103,6 +104,7 @@ struct Settings {
   DeviceSettings device;
   HandSettings hand;
   SpidarSettings spidar;
+  UsbSettings usb;
 
   std::int64_t period_ns() const;
 };

@@ -1,0 +1,234 @@
+// What goes wrong on a bus: the daemon does not crash, loses no descriptor, the motors are at zero in
+// time, the reason stands in the health stream, and it takes the board again by itself.
+#include <signal.h>
+#include <unistd.h>
+
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <thread>
+
+#include "protocol/words.h"
+#include "tests/process/observer.h"
+#include "tests/usb/emulated_bus.h"
+
+namespace {
+
+using namespace rikiseki;        // NOLINT(google-build-using-namespace)
+using namespace rikiseki::test;  // NOLINT(google-build-using-namespace)
+using Catch::Matchers::Contains;
+using protocol::ForceReason;
+using protocol::Role;
+
+constexpr int kWatchdogTicks = 20;
+constexpr double kPatienceS = 20;
+// What an ordinary user of no group is.
+constexpr char kNobody[] = "64003";
+
+// A daemon on an emulated bus, without a world: the device is what this is about.
+class Daemon {
+ public:
+  explicit Daemon(EmulatedBus& bus, const std::vector<std::string>& more = {},
+                  const std::vector<std::string>& before = {})
+      : bus_(bus), process_(Command(bus, more, before)), view_(Observe(instance_, Role::kHaptic)) {}
+
+  std::string device() const {
+    const protocol::HapticHealth health = ReadHapticHealth(*view_);
+    return protocol::Printable(health.device.data(), health.device.size());
+  }
+  ForceReason reason() const { return ReadHapticHealth(*view_).reason; }
+
+  bool Says(const std::string& trouble) const {
+    return Eventually([&] { return device() == trouble && reason() == ForceReason::kDeviceFault; },
+                      kPatienceS);
+  }
+
+  // It answers, and is asked.
+  bool Runs() const {
+    const long before = bus_.status().readings;
+    return Eventually(
+        [&] {
+          return device().starts_with("SPIDAR on USB") && reason() == ForceReason::kWorldAbsent &&
+                 bus_.status().readings > before + 20;
+        },
+        kPatienceS);
+  }
+
+  std::ptrdiff_t Descriptors() const {
+    const auto begin =
+        std::filesystem::directory_iterator("/proc/" + std::to_string(process_.pid()) + "/fd");
+    return std::distance(begin, std::filesystem::directory_iterator());
+  }
+
+  Child& process() { return process_; }
+
+ private:
+  std::vector<std::string> Command(EmulatedBus& bus, const std::vector<std::string>& more,
+                                   const std::vector<std::string>& before) {
+    std::vector<std::string> command = bus.HapticCommand(instance_, more);
+    command.insert(command.begin(), before.begin(), before.end());
+    return command;
+  }
+
+  Instance instance_;
+  EmulatedBus& bus_;
+  Child process_;
+  std::unique_ptr<protocol::PeerView> view_;
+};
+
+bool MotorsComeToZero(EmulatedBus& bus) {
+  return Eventually([&] { return bus.status().motors_at_zero == 1; }, 5) &&
+         bus.status().longest_pull_ticks < kWatchdogTicks;
+}
+
+int Cycles() {
+  return std::getenv("RIKISEKI_FULL") != nullptr ? 200 : 10;
+}
+
+}  // namespace
+
+TEST_CASE("unplugged and plugged in again, over and over, with counters kept or lost") {
+  const char* file = GENERATE("spidar4_simple.ini", "spidar4_sh4.ini");
+  EmulatedBus bus(file);
+  bus.Tell("plug");
+  Daemon daemon(bus);
+  REQUIRE(daemon.Runs());
+  const std::ptrdiff_t descriptors = daemon.Descriptors();
+  for (int cycle = 0; cycle < Cycles() / 2; ++cycle) {
+    CAPTURE(file, cycle);
+    bus.Tell("unplug");
+    REQUIRE(daemon.Says("SPIDAR: unplugged"));
+    REQUIRE(MotorsComeToZero(bus));
+    if (cycle % 2 == 0) bus.Tell("forget");
+    bus.Tell("plug");
+    REQUIRE(daemon.Runs());
+    CHECK(daemon.Descriptors() == descriptors);
+  }
+  daemon.process().Signal(SIGTERM);
+  CHECK(daemon.process().Wait() == 0);
+  CHECK(bus.status().motors_at_zero == 1);
+  CHECK(bus.status().nonsense == 0);
+}
+
+TEST_CASE("faults of the bus and the firmware: each is named and gets over by itself") {
+  const std::string file = GENERATE("spidar4_simple.ini", "spidar4_sh4.ini");
+  CAPTURE(file);
+  EmulatedBus bus(file);
+  bus.Tell("plug");
+  Daemon daemon(bus);
+  REQUIRE(daemon.Runs());
+  const std::ptrdiff_t descriptors = daemon.Descriptors();
+  const auto log_says = [&](const std::string& text) {
+    return Eventually([&] { return daemon.process().Stderr().find(text) != std::string::npos; },
+                      kPatienceS);
+  };
+  // A stall is over as soon as the board is opened anew.
+  bus.Tell("stall_in");
+  CHECK(log_says("an endpoint of the board stalled"));
+  CHECK(daemon.Runs());
+  bus.Tell("stall_out");
+  CHECK(daemon.Runs());
+
+  bus.Tell("reply_bytes 16");
+  CHECK(daemon.Says("SPIDAR: wrong firmware"));
+  CHECK(log_says("answers 16 bytes, not "));
+  CHECK(MotorsComeToZero(bus));
+  bus.Tell("reply_bytes right");
+  CHECK(daemon.Runs());
+
+  bus.Tell("late_us 10000");
+  CHECK(log_says("came late or not at all"));
+  bus.Tell("late_us 0");
+  CHECK(daemon.Runs());
+
+  bus.Tell("mute on");
+  CHECK(daemon.Says("SPIDAR: board does not answer"));
+  bus.Tell("mute off");
+  CHECK(daemon.Runs());
+
+  bus.Tell("nak on");
+  CHECK(daemon.Says("SPIDAR: board does not answer"));
+  CHECK(MotorsComeToZero(bus));
+  bus.Tell("nak off");
+  CHECK(daemon.Runs());
+
+  if (file == "spidar4_sh4.ini") {
+    bus.Tell("wrong_echo on");
+    CHECK(daemon.Says("SPIDAR: wrong firmware"));
+    CHECK(log_says("does not echo its D/A settings"));
+    bus.Tell("wrong_echo off");
+    CHECK(daemon.Runs());
+  }
+
+  bus.Tell("foreign on");
+  CHECK(daemon.Says("SPIDAR: wrong firmware"));
+  bus.Tell("foreign off");
+  CHECK(daemon.Runs());
+
+  bus.Tell("unplug");
+  bus.Tell("plug_blank");
+  CHECK(daemon.Says("SPIDAR: board without firmware"));
+  CHECK(log_says("04B4:8613"));
+  bus.Tell("unplug_blank");
+  bus.Tell("plug busy");
+  CHECK(daemon.Says("SPIDAR: used by another program"));
+  bus.Tell("busy off");
+  CHECK(daemon.Runs());
+
+  CHECK(daemon.Descriptors() == descriptors);
+  CHECK(MotorsComeToZero(bus) == false);  // they hold the strings
+  daemon.process().Signal(SIGKILL);
+  daemon.process().Wait();
+  CHECK(MotorsComeToZero(bus));  // the firmware's work
+}
+
+TEST_CASE("two boards: the daemon takes neither until it is told or one is gone") {
+  EmulatedBus bus("spidar4_sh4.ini");
+  bus.Tell("plug");
+  bus.Tell("plug_second");
+  Daemon daemon(bus);
+  CHECK(daemon.Says("SPIDAR: more than one board"));
+  CHECK_THAT(daemon.process().Stderr(), Contains("usb.switch_id"));
+  bus.Tell("unplug_second");
+  CHECK(daemon.Runs());
+}
+
+TEST_CASE("a board with another switch is not taken, and --check tells") {
+  EmulatedBus bus("spidar4_simple.ini");
+  bus.Tell("plug");
+  {
+    Daemon daemon(bus, {"--set", "usb.switch_id=9"});
+    CHECK(daemon.Says("SPIDAR: wrong switch or serial"));
+    CHECK_THAT(daemon.process().Stderr(), Contains("has its switch at 5"));
+  }
+  // Its stdout, by the way of a shell that sends it to where the test reads.
+  std::string command;
+  for (const std::string& word : bus.HapticCommand("check", {"--check"})) command += word + " ";
+  Child check({"/bin/sh", "-c", command + "1>&2"});
+  CHECK(check.Wait() == 0);
+  CHECK_THAT(check.Stderr(),
+             Contains("# device: board Simple (0CEC:0203) at bus 1 device 2, switch "
+                      "at 5"));
+  CHECK(bus.status().motors_at_zero == 1);
+  Daemon daemon(bus, {"--set", "usb.switch_id=5"});
+  CHECK(daemon.Runs());
+}
+
+TEST_CASE(
+    "without permission the daemon says which rule and group, and takes the board when it may") {
+  if (geteuid() != 0) {
+    WARN("not root: skipped");
+    return;
+  }
+  EmulatedBus bus("spidar4_simple.ini");
+  bus.Tell("plug forbidden");
+  Daemon daemon(bus, {},
+                {"/usr/bin/setpriv", std::string("--reuid=") + kNobody,
+                 std::string("--regid=") + kNobody, "--clear-groups"});
+  CHECK(daemon.Says("SPIDAR: permission denied"));
+  CHECK_THAT(daemon.process().Stderr(), Contains("70-rikiseki.rules"));
+  CHECK_THAT(daemon.process().Stderr(), Contains("haptics"));
+  bus.Tell("permit");
+  CHECK(daemon.Runs());
+}
