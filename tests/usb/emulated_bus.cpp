@@ -43,7 +43,9 @@ std::vector<std::string> EmulatorCommand(const std::string& device_file,
 std::vector<std::string> UsbSettingsOf(const std::string& device_file) {
   return {"device.file=" + SourceFile("config/devices/" + device_file),
           "loop.rate_hz=" + std::to_string(kUsbRateHz), "usb.reply_within_us=3500",
-          "safety.slew_limit_n_per_s=5000"};
+          "safety.slew_limit_n_per_s=5000",
+          // Time to put the block back between two pushes.
+          "hand.rest_ms=700"};
 }
 
 EmulatedBus::EmulatedBus(const std::string& device_file)
@@ -65,7 +67,7 @@ EmulatedBus::EmulatedBus(const std::string& device_file)
 
 EmulatedBus::~EmulatedBus() {
   const std::string quit = "quit\n";
-  if (write(connection_, quit.data(), quit.size()) > 0) process_.Wait(5);
+  if (send(connection_, quit.data(), quit.size(), MSG_NOSIGNAL) > 0) process_.Wait(5);
   close(connection_);
   std::filesystem::remove(socket_path_);
 }
@@ -74,7 +76,7 @@ std::string EmulatedBus::Tell(const std::string& command) {
   const std::string line = command + "\n";
   std::string answer;
   char c = 0;
-  if (write(connection_, line.data(), line.size()) > 0) {
+  if (send(connection_, line.data(), line.size(), MSG_NOSIGNAL) > 0) {
     while (read(connection_, &c, 1) == 1 && c != '\n') answer += c;
   }
   if (c != '\n' || answer == "what?") {

@@ -70,6 +70,7 @@ UsbFs::UsbFs(UMockdevTestbed* testbed, std::mutex& mutex, const Identity& identi
       descriptors_(Descriptors(identity.vendor, identity.product)) {
   handler_ = umockdev_ioctl_base_new();
   g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(OnIoctl), this);
+  g_signal_connect(handler_, "client-vanished", G_CALLBACK(OnVanished), this);
 }
 
 UsbFs::~UsbFs() {
@@ -120,10 +121,7 @@ void UsbFs::Plug(const BusFaults& already, bool with_permission) {
   {
     const std::lock_guard lock(mutex_);
     for (auto* queue : {&in_, &out_, &done_}) {
-      for (const Urb& urb : *queue) {
-        if (urb.buffer != nullptr) g_object_unref(urb.buffer);
-        g_object_unref(urb.data);
-      }
+      for (const Urb& urb : *queue) Forget(urb);
       queue->clear();
     }
     replies_.clear();
@@ -240,6 +238,24 @@ gboolean UsbFs::OnIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointe
   return TRUE;
 }
 
+void UsbFs::Forget(const Urb& urb) {
+  if (urb.buffer != nullptr) g_object_unref(urb.buffer);
+  g_object_unref(urb.data);
+}
+
+// As the kernel does where a file is closed: by the end of a process that was killed, too.
+void UsbFs::OnVanished(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
+  auto* usb = static_cast<UsbFs*>(self);
+  const std::lock_guard lock(usb->mutex_);
+  for (auto* queue : {&usb->in_, &usb->out_, &usb->done_}) {
+    const auto end = std::stable_partition(queue->begin(), queue->end(),
+                                           [&](const Urb& urb) { return urb.client != client; });
+    std::for_each(end, queue->end(), Forget);
+    queue->erase(end, queue->end());
+  }
+  usb->ShowReadiness();
+}
+
 void UsbFs::Ioctl(UMockdevIoctlClient* client) {
   const auto request = umockdev_ioctl_client_get_request(client);
   UMockdevIoctlData* argument = umockdev_ioctl_client_get_arg(client);
@@ -252,6 +268,7 @@ void UsbFs::Ioctl(UMockdevIoctlClient* client) {
     case USBDEVFS_GET_CAPABILITIES: {
       UMockdevIoctlData* data =
           umockdev_ioctl_data_resolve(argument, 0, sizeof(std::uint32_t), nullptr);
+      if (data == nullptr) return complete(-1, EFAULT);
       const std::uint32_t capabilities =
           USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
           USBDEVFS_CAP_BULK_SCATTER_GATHER | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
@@ -300,7 +317,11 @@ void UsbFs::Submit(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
           ? umockdev_ioctl_data_resolve(data, offsetof(usbdevfs_urb, buffer),
                                         static_cast<gsize>(raw->buffer_length), nullptr)
           : nullptr;
-  const Urb urb{data, buffer, data->client_addr};
+  if (raw->buffer_length > 0 && buffer == nullptr) {
+    g_object_unref(data);
+    return umockdev_ioctl_client_complete(client, -1, EFAULT);
+  }
+  const Urb urb{client, data, buffer, data->client_addr};
   if (raw->type == USBDEVFS_URB_TYPE_CONTROL) {
     Control(urb);
   } else if ((raw->endpoint & 0x80) != 0) {
@@ -321,14 +342,14 @@ void UsbFs::Reap(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
     return;
   }
   UMockdevIoctlData* slot = umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
+  if (slot == nullptr) return umockdev_ioctl_client_complete(client, -1, EFAULT);
   const Urb urb = done_.front();
   done_.pop_front();
   umockdev_ioctl_data_set_ptr(slot, 0, urb.data);
   ShowReadiness();
   g_object_unref(slot);
   umockdev_ioctl_client_complete(client, 0, 0);
-  if (urb.buffer != nullptr) g_object_unref(urb.buffer);
-  g_object_unref(urb.data);
+  Forget(urb);
 }
 
 bool UsbFs::Discard(std::uint64_t address) {

@@ -62,6 +62,7 @@ class UsbFs {
 
  private:
   struct Urb {
+    const UMockdevIoctlClient* client = nullptr;
     UMockdevIoctlData* data = nullptr;
     UMockdevIoctlData* buffer = nullptr;
     std::uint64_t address = 0;  // of the host's struct: its name when it is discarded
@@ -72,6 +73,8 @@ class UsbFs {
   };
 
   static gboolean OnIoctl(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
+  static void OnVanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
+  static void Forget(const Urb& urb);
   void Ioctl(UMockdevIoctlClient* client);
   void Submit(UMockdevIoctlClient* client, UMockdevIoctlData* argument);
   void Reap(UMockdevIoctlClient* client, UMockdevIoctlData* argument);
