@@ -80,6 +80,7 @@ struct BulletWorld::Engine {
   void Apply(const Kick& kick);
   void Substep(double step_s);
   BodyState State(const Body& body) const;
+  void SetState(const Body& body, const BodyState& state);
   void AddImpulses(std::size_t body, std::span<const BodyState> states,
                    std::span<ContactSite> sites);
 };
@@ -232,6 +233,17 @@ BodyState BulletWorld::Engine::State(const Body& body) const {
           .angular_velocity = FromBullet(rigid.getAngularVelocity())};
 }
 
+void BulletWorld::Engine::SetState(const Body& body, const BodyState& state) {
+  btRigidBody& rigid = *moving[body.moving].rigid;
+  const btTransform pose = ToBullet(state.pose * Pose{.orientation = body.q_BP});
+  rigid.setWorldTransform(pose);
+  rigid.setInterpolationWorldTransform(pose);
+  rigid.setLinearVelocity(ToBullet(state.velocity));
+  rigid.setAngularVelocity(ToBullet(state.angular_velocity));
+  rigid.updateInertiaTensor();
+  world.updateSingleAabb(&rigid);
+}
+
 // Adds what the solver gave in the last substep, each impulse to the nearest site of the same pair
 // and direction.
 void BulletWorld::Engine::AddImpulses(std::size_t body, std::span<const BodyState> states,
@@ -291,6 +303,12 @@ bool BulletWorld::simulates() const {
 
 BodyState BulletWorld::State(std::size_t body) const {
   return states_[body];
+}
+
+void BulletWorld::SetState(std::size_t body, const BodyState& state) {
+  if (!engine_ || scene_.bodies[body].fixed) return;
+  engine_->SetState(engine_->bodies[body], state);
+  states_[body] = state;
 }
 
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
