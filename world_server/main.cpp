@@ -22,15 +22,24 @@ using namespace rikiseki::world;  // NOLINT(google-build-using-namespace)
 // Room in world.bodies for scenes that grow when they are reloaded.
 constexpr std::uint32_t kBodyRoom = 256;
 
+SceneUse UseOf(const Settings& settings) {
+  return {.coupling = settings.coupling.coupling,
+          .finger_friction = settings.features.finger_friction};
+}
+
 // Tells observers of every scene that runs, once.
 class SceneAnnouncer {
  public:
-  SceneAnnouncer(const protocol::SegmentOwner& owner, std::uint32_t body_room)
-      : writer_(owner.Stream(protocol::StreamType::kWorldScene)), body_room_(body_room) {}
+  SceneAnnouncer(const protocol::SegmentOwner& owner, const SceneUse& use, std::uint32_t body_room)
+      : writer_(owner.Stream(protocol::StreamType::kWorldScene)),
+        use_(use),
+        body_room_(body_room) {}
 
   void Publish(const WorldStep& step) {
     const Scene& scene = step.scene();
-    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_);
+    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_, use_);
+    spdlog::info("needs: {}", InWords(message.needs));
+    spdlog::info("left out: {}", InWords(message.left_out));
     if (scene.bodies.size() > body_room_) {
       spdlog::warn(
           "scene {} has grown to {} bodies, and world.bodies has room for {}: observers see none "
@@ -47,6 +56,7 @@ class SceneAnnouncer {
 
  private:
   protocol::SceneWriter writer_;
+  SceneUse use_;
   std::uint32_t body_room_;
   std::uint64_t revision_ = 0;
 };
@@ -100,7 +110,7 @@ int Run(int argc, char** argv) {
   const Scene& scene = ready.loaded.scene;
   if (options.check) {
     std::fputs(description.c_str(), stdout);
-    const SceneNeeds needs = WorkOutNeeds(scene);
+    const SceneNeeds needs = WorkOutNeeds(scene, UseOf(settings));
     std::printf("scene %s: %zu bodies\nneeds: %s\nleft out: %s\n", scene.name.c_str(),
                 scene.bodies.size(), InWords(needs.needs).c_str(), InWords(needs.left_out).c_str());
     return kExitOk;
@@ -127,7 +137,7 @@ int Run(int argc, char** argv) {
   WorldLoop loop(settings, step, owner, link);
   spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(),
                settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
-  SceneAnnouncer announcer(owner, body_room);
+  SceneAnnouncer announcer(owner, UseOf(settings), body_room);
   announcer.Publish(step);
   SceneReload reload(settings, std::move(ready.loaded.files));
   RunUntilStopped(settings, step, loop, link, announcer, reload);

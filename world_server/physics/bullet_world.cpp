@@ -16,7 +16,6 @@
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_rebound.h"
 #include "world_server/physics/bullet_shapes.h"
-#include "world_server/physics/contact_sites.h"
 #include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
@@ -328,7 +327,7 @@ bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
   if (!engine_ || scene_.bodies[body].fixed) return false;
   const std::size_t first = sites.size();
-  if (!FindContactSites(scene_, states_, body, reach_m, sites)) return false;
+  if (!site_finder_.Find(states_, body, reach_m, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);
   for (ContactSite& site : found) site.gap += engine_->resting_depth;
   engine_->AddImpulses(body, states_, found);

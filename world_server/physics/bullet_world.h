@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "world_server/physics/contact_sites.h"
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/scene/scene.h"
 
@@ -36,6 +37,7 @@ class BulletWorld final : public DynamicsWorld {
  private:
   struct Engine;
   Scene scene_;
+  SiteFinder site_finder_{scene_};
   std::vector<BodyState> states_;  // of all bodies, now
   double longest_substep_s_;
   std::unique_ptr<Engine> engine_;  // null where nothing moves
