@@ -248,6 +248,14 @@ void BulletWorld::ReadStates() {
   engine_->moved.clear();
 }
 
+void BulletWorld::SetState(std::size_t body, const BodyState& state) {
+  if (!engine_ || scene_.bodies[body].fixed) return;
+  const std::size_t place = engine_->bodies.moving_of[body];
+  engine_->sleepers.Wake(place);
+  engine_->bodies.moving[place].SetState(state);
+  states_[body] = state;
+}
+
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   if (!engine_) return;
   for (const Kick& kick : kicks) engine_->Apply(kick);
