@@ -95,7 +95,7 @@ struct BulletWorld::Engine {
                   bool long_substeps);
   void StepGroup(const Group& group, std::size_t place, std::span<const FineStep> steps,
                  double window_s, double substep_s, bool long_substeps);
-  void Step(const Group& group, double length_s, double longest_s);
+  void Step(const Group& group, double length_s, double longest_s, int sweeps);
 };
 
 // A push is on its way, or has come: its body wakes.
@@ -125,9 +125,9 @@ void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
 }
 
 // Of a group alone.
-void BulletWorld::Engine::Step(const Group& group, double length_s, double longest_s) {
+void BulletWorld::Engine::Step(const Group& group, double length_s, double longest_s, int sweeps) {
   const int count = SubstepCount(length_s, longest_s);
-  for (int done = 0; done < count; ++done) world.Step(group, length_s / count);
+  for (int done = 0; done < count; ++done) world.Step(group, length_s / count, sweeps);
   substeps += static_cast<std::uint64_t>(count);
 }
 
@@ -135,10 +135,11 @@ void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
                                     std::span<const FineStep> steps, double window_s,
                                     double substep_s, bool long_substeps) {
   const GroupMotion motion = MotionOf(group, bodies, sleepers);
+  const int sweeps = Sweeps(motion);
   const bool is_pushed = std::any_of(group.members.begin(), group.members.end(),
                                      [this](std::size_t body) { return pushed[body] != 0; });
   if (!is_pushed && long_substeps) {
-    if (window_s > 0) Step(group, window_s, CoarseSubstep(motion, substep_s, window_s));
+    if (window_s > 0) Step(group, window_s, CoarseSubstep(motion, substep_s, window_s), sweeps);
     return;
   }
   const double longest_s = PushedSubstep(motion, substep_s);
@@ -147,7 +148,7 @@ void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
       const std::size_t body = bodies.moving_of[push.body];
       if (body != BulletBodies::kFixed && islands.GroupOf(body) == place) Apply(push);
     }
-    if (step.length_s > 0) Step(group, step.length_s, longest_s);
+    if (step.length_s > 0) Step(group, step.length_s, longest_s, sweeps);
   }
 }
 

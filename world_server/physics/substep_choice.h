@@ -14,6 +14,7 @@ struct GroupMotion {
   bool meets = false;         // something could be met
   bool meets_moving = false;  // ... that can move itself, or a joint holds two
   bool rebounds = false;      // restitution
+  bool meets_late = false;    // contacts that are found only when two have met already
   double smallest = 0;        // m, least inner diameter of those that could meet each other
   double mass_ratio = 1;      // heaviest / lightest of them, >= 1
   double turning = 0;         // rad/s, the fastest
@@ -23,6 +24,9 @@ struct GroupMotion {
 };
 
 GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleepers& sleepers);
+
+/// How often the solver goes over the contacts: 50 times, more for ill-matched masses.
+int Sweeps(const GroupMotion& motion);
 
 /// Where a push enters [s], never longer than `substep_s`; shorter only where small or ill-matched
 /// bodies meet each other.

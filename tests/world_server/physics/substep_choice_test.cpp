@@ -36,6 +36,16 @@ TEST_CASE("in contact a lone body bears 5 ms, a fast, a bouncing or a spinning o
   CHECK(CoarseSubstep(bouncing, kSubstep, kWindow) == kSubstep);
 }
 
+TEST_CASE("what meets late, or unequal, is stepped finely and swept more often") {
+  GroupMotion late{.awake = 1, .meets = true, .meets_late = true};
+  CHECK(CoarseSubstep(late, kSubstep, kWindow) == kSubstep);
+  CHECK(Sweeps(late) == 50);
+  late.mass_ratio = 100;
+  CHECK(Sweeps(late) == 200);
+  late.mass_ratio = 1e12;
+  CHECK(Sweeps(late) == 400);
+}
+
 TEST_CASE("stacks: 2 ms for 5 cm, as the root of the size, and shorter for ill-matched masses") {
   const GroupMotion pair{
       .awake = 2, .meets = true, .meets_moving = true, .smallest = 0.05, .gravity = 9.81};
