@@ -246,6 +246,7 @@ void BulletWorld::ReadStates() {
   for (const std::size_t place : engine_->moved) {
     const MovingBody& body = engine_->bodies.moving[place];
     states_[static_cast<std::size_t>(body.rigid->getUserIndex2())] = body.State();
+    engine_->islands.UpdateBox(place);
   }
   engine_->moved.clear();
 }
@@ -267,11 +268,12 @@ void BulletWorld::Play(std::span<const Stretch> stretches) {
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
   if (!engine_ || scene_.bodies[body].fixed) return false;
+  const std::size_t place = engine_->bodies.moving_of[body];
+  const std::vector<std::size_t> others = engine_->islands.Near(place, reach_m);
   const std::size_t first = sites.size();
-  if (!FindContactSites(scene_, states_, body, reach_m, sites)) return false;
+  if (!FindContactSites(scene_, states_, body, reach_m, others, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);
   for (ContactSite& site : found) site.gap += engine_->resting_depth;
-  const std::size_t place = engine_->bodies.moving_of[body];
   const MovingBody& moving = engine_->bodies.moving[place];
   // Of a substep as long as those of what is pushed, however long the last one was.
   const double scale = moving.last_step_s > substep_s_ ? substep_s_ / moving.last_step_s : 1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "common/body_step.h"
 #include "world_server/features/nearest_point.h"
@@ -107,14 +108,15 @@ bool MayReach(const Collider& a, const Pose& pose_WA, const Collider& b, const P
 }  // namespace
 
 bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std::size_t body,
-                      double reach_m, std::vector<ContactSite>& sites) {
+                      double reach_m, std::span<const std::size_t> others,
+                      std::vector<ContactSite>& sites) {
   const std::size_t first = sites.size();
   const BodyState& state = states[body];
   const Pose pose_BW = state.pose.Inverse();
   std::vector<Near> found;
   for (const Collider& collider : scene.bodies[body].colliders) {
     const Pose pose_WS = state.pose * collider.pose_BS;
-    for (std::size_t other = 0; other < scene.bodies.size(); ++other) {
+    for (const std::size_t other : others) {
       if (other == body) continue;
       const SceneBody& other_body = scene.bodies[other];
       for (const Collider& other_collider : other_body.colliders) {
@@ -155,6 +157,13 @@ bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std
                      return std::round(a.gap / kSameGap) < std::round(b.gap / kSameGap);
                    });
   return true;
+}
+
+bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std::size_t body,
+                      double reach_m, std::vector<ContactSite>& sites) {
+  std::vector<std::size_t> all(scene.bodies.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return FindContactSites(scene, states, body, reach_m, all, sites);
 }
 
 }  // namespace rikiseki::world

@@ -214,7 +214,11 @@ void GroupedWorld::Step(const Group& group, double step_s, int sweeps) {
   integrateTransformsInternal(rigids_.data(), static_cast<int>(rigids_.size()), step_s);
   EndSubstep(manifolds_, bodies_.moving, stepped_, step_s, parts_.rotation);
   if (parts_.rebound) Rebound(manifolds_, bodies_, gravity_, step_s);
-  for (const std::size_t place : stepped_) bodies_.moving[place].last_step_s = step_s;
+  for (const std::size_t place : stepped_) {
+    MovingBody& body = bodies_.moving[place];
+    body.last_step_s = step_s;
+    body.last_velocity = FromBullet(body.rigid->getLinearVelocity());
+  }
 }
 
 }  // namespace rikiseki::world

@@ -130,9 +130,8 @@ void Islands::Unite(std::size_t a, std::size_t b) {
   united_[other].clear();
 }
 
-// Twice the way: whoever comes to meet it is no faster, or asks itself.
-void Islands::Ask(std::size_t body, double reach_m) {
-  btRigidBody& rigid = *bodies_.moving[body].rigid;
+// Others whose boxes are that near.
+std::vector<btRigidBody*> Islands::Overlapping(const btRigidBody& rigid, double reach_m) {
   const btBroadphaseProxy& proxy = *rigid.getBroadphaseHandle();
   const btVector3 reach(reach_m, reach_m, reach_m);
   const btVector3 low = proxy.m_aabbMin - reach;
@@ -140,8 +139,13 @@ void Islands::Ask(std::size_t body, double reach_m) {
   std::vector<btRigidBody*> found;
   Overlaps overlaps(low, high, found);
   broadphase_.aabbTest(low, high, overlaps);
-  for (btRigidBody* other : found) {
-    if (other == &rigid) continue;
+  std::erase(found, &rigid);
+  return found;
+}
+
+void Islands::Ask(std::size_t body, double reach_m) {
+  btRigidBody& rigid = *bodies_.moving[body].rigid;
+  for (btRigidBody* other : Overlapping(rigid, reach_m)) {
     ContactPair* pair = pairs_.Plan(rigid, *other, plan_);
     if (pair == nullptr) continue;
     planned_.push_back(pair);
@@ -152,6 +156,25 @@ void Islands::Ask(std::size_t body, double reach_m) {
   }
 }
 
+std::vector<std::size_t> Islands::Near(std::size_t body, double reach_m) {
+  std::vector<std::size_t> near;
+  for (const btRigidBody* other : Overlapping(*bodies_.moving[body].rigid, reach_m)) {
+    near.push_back(static_cast<std::size_t>(other->getUserIndex2()));
+  }
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  return near;
+}
+
+void Islands::UpdateBox(std::size_t body) {
+  btRigidBody& rigid = *bodies_.moving[body].rigid;
+  btVector3 low, high;
+  rigid.getAabb(low, high);
+  // Who was thrown out of the world meets nobody any more.
+  if (!((high - low).length2() < kTooLarge)) return;
+  broadphase_.setAabb(rigid.getBroadphaseHandle(), low, high, world_.getDispatcher());
+}
+
 std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_speed) {
   KnowJoints();
   ++plan_;
@@ -160,14 +183,7 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
   members_.clear();
   to_ask_.clear();
   planned_.clear();
-  for (const std::size_t body : sleepers_.awake()) {
-    btRigidBody& rigid = *bodies_.moving[body].rigid;
-    btVector3 low, high;
-    rigid.getAabb(low, high);
-    // Who was thrown out of the world meets nobody any more.
-    if (!((high - low).length2() < kTooLarge)) continue;
-    broadphase_.setAabb(rigid.getBroadphaseHandle(), low, high, world_.getDispatcher());
-  }
+  for (const std::size_t body : sleepers_.awake()) UpdateBox(body);
   for (const std::size_t body : sleepers_.awake()) Add(body);
   while (!to_ask_.empty()) {
     const std::size_t body = to_ask_.back();
@@ -176,6 +192,7 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
     const double speed = RoundedUp(speeds_[RootOf(body)]);
     if (asked_[body] >= speed) continue;
     asked_[body] = speed;
+    // Twice the way: whoever comes to meet it is no faster, or asks itself.
     if (contacts_) Ask(body, 2 * speed * window_s + kMargin);
   }
 

@@ -33,6 +33,12 @@ class Islands {
   /// is what the pushes of the window may add. Valid until the next plan.
   std::span<Group> Plan(double window_s, std::span<const double> pushed_speed);
 
+  /// Keeps the broad phase true to where the body is.
+  void UpdateBox(std::size_t body);
+  /// The scene's bodies that may be within `reach_m` of a moving body where it was at UpdateBox, itself
+  /// excluded; ascending.
+  std::vector<std::size_t> Near(std::size_t body, double reach_m);
+
   /// The place among the last plan.s groups of a body that is in it.
   std::size_t GroupOf(std::size_t body) const { return group_of_[body]; }
 
@@ -44,6 +50,7 @@ class Islands {
   void Unite(std::size_t a, std::size_t b);
   std::size_t RootOf(std::size_t body);
   void Ask(std::size_t body, double reach_m);
+  std::vector<btRigidBody*> Overlapping(const btRigidBody& rigid, double reach_m);
   double SpeedOf(std::size_t body) const;
 
   BulletBodies& bodies_;
