@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kShortest = 1e-4;         // s: bounds what a scene can cost
 constexpr double kLongestTouching = 5e-3;  // s
+constexpr double kResting = 0.01;          // m/s: slower, and any substep will do
 constexpr double kMostTurn = 0.1;          // rad in a substep of free flight
 // ... while something is touched: the direction of slip is one and the same for a substep, and lags
 // half of what the body turns in it.
@@ -55,6 +56,8 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
     ++motion.awake;
     const double speed = body.rigid->getLinearVelocity().length();
     motion.turning = std::max(motion.turning, double{body.rigid->getAngularVelocity().length()});
+    motion.speed = std::max(motion.speed,
+                            speed + body.outer_radius * body.rigid->getAngularVelocity().length());
     if (body.inner_radius > 0) {
       motion.crossing = std::max(motion.crossing, speed / body.inner_radius);
     }
@@ -109,7 +112,8 @@ double CoarseSubstep(const GroupMotion& motion, double substep_s, double window_
   if (motion.rebounds || motion.meets_late) return pushed;
   if (motion.meets) {
     const double height = std::min(static_cast<double>(motion.awake), kHighStack) / kHighStack;
-    coarse = std::min({coarse, kLongestTouching, PerSecond(motion.turning, kMostTouchingTurn),
+    const double touching = motion.speed < kResting ? window_s : kLongestTouching;
+    coarse = std::min({coarse, touching, PerSecond(motion.turning, kMostTouchingTurn),
                        PerSecond(motion.crossing, 0.5), StackSubstep(motion) / (1 + height)});
   }
   return std::max(coarse, pushed);

@@ -19,6 +19,7 @@ struct GroupMotion {
   double mass_ratio = 1;      // heaviest / lightest of them, >= 1
   double turning = 0;         // rad/s, the fastest
   double crossing = 0;        // 1/s, the fastest speed / inner radius
+  double speed = 0;           // m/s, of any point of any of them
   double drag = 0;            // 1/s, the fastest rate
   double gravity = 0;         // m/s^2
 };
@@ -32,7 +33,7 @@ int Sweeps(const GroupMotion& motion);
 /// bodies meet each other.
 double PushedSubstep(const GroupMotion& motion, double substep_s);
 
-/// Where none does [s]: `window_s` in free flight, 5 ms of a lone body in contact; never shorter than
+/// Where none does [s]: `window_s` in free flight and at rest, 5 ms of a lone body in contact; never shorter than
 /// PushedSubstep.
 double CoarseSubstep(const GroupMotion& motion, double substep_s, double window_s);
 
