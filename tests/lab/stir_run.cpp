@@ -7,6 +7,7 @@
 #include <memory>
 #include <sstream>
 
+#include "common/clock.h"
 #include "haptic_server/device/hand.h"
 #include "protocol/codec.h"
 #include "protocol/impulse_units.h"
@@ -18,7 +19,7 @@ namespace rikiseki::lab {
 namespace {
 
 constexpr haptic::Impedance kHand{0.93, 15.2, 500};  // of config/haptic_server.ini, with its device
-const Vec3 kCorner(-0.06, -0.05, -0.025);            // m, the box in which it stirs
+const Vec3 kCorner(-0.06, -0.05, -0.06);             // m, the box in which it stirs
 const Vec3 kOpposite(0.06, 0.05, 0.045);
 const Vec3 kHome(-0.05, 0, 0.3);     // m, above everything, at the beginning and the end
 constexpr double kLead = 0.5;        // s, at home: longer than the soft start
