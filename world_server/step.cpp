@@ -85,6 +85,7 @@ void WorldStep::State::Adopt(Scene new_scene, std::unique_ptr<DynamicsWorld> new
   ReadStates();
 }
 
+// Puts what goes on where it was, at its velocity, and makes the new engine know what carries it.
 void WorldStep::State::GoOn(std::span<const BodyChange> changes) {
   bool any = false;
   std::vector<BodyState> start;

@@ -19,6 +19,7 @@ struct Stir {
   double duration_s = 60;
   double world_rate_hz = 20;
   protocol::Coupling coupling = protocol::Coupling::kLocal;
+  double low_m = -0.03;  // the lower end of its box: where most scenes have their floor
   std::uint64_t seed = 1;
 };
 
@@ -27,17 +28,17 @@ struct StirResult {
   double force_peak_n = 0;  // on the finger
   double over_cap_n = 0;    // of it, beyond the cap: must be 0
   double over_slew_n = 0;   // of its change from tick to tick, beyond the limit: must be 0
-  double energy_peak_j =
-      0;              // of the bodies that move, kinetic + potential, above that of the start
-  double work_j = 0;  // that the finger did
-  double energy_excess_j =
-      0;                      // the most that the bodies ever had beyond what start and finger gave
-  double unaccounted_ns = 0;  // of the impulse, when all is said: must be 0
-  double displayed_ns = 0;    // impulse on bodies, sum of what the books hold at the end
-  double discarded_ns = 0;    // of it, declared not applied
-  double farthest_m = 0;      // of any body from where it began
-  double largest_jump_m = 0;  // of a local copy at a frame
-  std::uint64_t flagged = 0;  // contacts that the energy meter found unstable
+  double work_j = 0;        // that the finger did
+  // Of the bodies that move, kinetic + potential, above that of the start.
+  double energy_peak_j = 0;
+  // The most that they ever had beyond what start and finger gave.
+  double energy_excess_j = 0;
+  double unaccounted_ns = 0;     // of the impulse, when all is said: must be 0
+  double displayed_ns = 0;       // impulse on bodies, sum of what the books hold at the end
+  double discarded_ns = 0;       // of it, declared not applied
+  double farthest_m = 0;         // of any body from where it began
+  double largest_jump_m = 0;     // of a local copy at a frame
+  std::uint64_t flagged = 0;     // contacts that the energy meter found unstable
   std::vector<double> world_us;  // CPU of each world tick with what it consumed: wall clock
   std::uint64_t hash = 0;        // of every haptic tick and every body after every world tick
 };

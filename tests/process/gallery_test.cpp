@@ -52,7 +52,7 @@ TEST_CASE("a hand stirs in the scenes of the gallery") {
   const auto world_view = Observe(instance, Role::kWorld, 30);
   Child haptic({Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"),
                 "--instance", instance, "--set", "hand.script=stir", "--set",
-                "hand.home_mm=-60 -50 45", "--set", "hand.stroke_mm=120 100 -70", "--set",
+                "hand.home_mm=-60 -50 45", "--set", "hand.stroke_mm=120 100 -75", "--set",
                 "safety.slew_limit_n_per_s=5000"});
   const auto haptic_view = Observe(instance, Role::kHaptic);
   REQUIRE(
