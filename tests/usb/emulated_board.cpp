@@ -105,7 +105,6 @@ std::optional<std::vector<std::uint8_t>> EmulatedBoard::HandleSh4(
   return reply;
 }
 
-// Pulls as the D/A says: the tension that a digit stands for is worked out here once more.
 void EmulatedBoard::Command(std::span<const std::uint8_t> words) {
   for (std::size_t channel = 0; channel < 8; ++channel) digits_[channel] = Word(words, 2 * channel);
   uncommanded_ticks_ = 0;
@@ -129,6 +128,7 @@ void EmulatedBoard::ForgetCounters() {
   phase_ = 0;
 }
 
+// Pulls as the D/A says: the tension that a digit stands for is worked out here once more.
 void EmulatedBoard::Advance(std::int64_t now_ns) {
   ++readings_;
   EncoderCounts counts{};

@@ -53,12 +53,14 @@ class Daemon {
   // It answers, and is asked.
   bool Runs() const {
     const long before = bus_.status().readings;
-    return Eventually(
+    const bool runs = Eventually(
         [&] {
           return device().starts_with("SPIDAR on USB") && reason() == ForceReason::kWorldAbsent &&
                  bus_.status().readings > before + 20;
         },
         kPatienceS);
+    if (!runs) WARN("device: " << device() << "; log: " << process_.Stderr());
+    return runs;
   }
 
   std::ptrdiff_t Descriptors() const {
