@@ -23,7 +23,8 @@ std::string NewSocketPath() {
 }
 
 std::vector<std::string> EmulatorCommand(const std::string& device_file,
-                                         const std::string& socket_path) {
+                                         const std::string& socket_path,
+                                         const std::vector<std::string>& more) {
   std::vector<std::string> command = {"/usr/bin/umockdev-wrapper",
                                       Program("usb_emulator"),
                                       "--config",
@@ -35,6 +36,7 @@ std::vector<std::string> EmulatorCommand(const std::string& device_file,
   for (const std::string& setting : UsbSettingsOf(device_file)) {
     command.insert(command.end(), {"--set", setting});
   }
+  for (const std::string& setting : more) command.insert(command.end(), {"--set", setting});
   return command;
 }
 
@@ -48,10 +50,10 @@ std::vector<std::string> UsbSettingsOf(const std::string& device_file) {
           "hand.rest_ms=700"};
 }
 
-EmulatedBus::EmulatedBus(const std::string& device_file)
+EmulatedBus::EmulatedBus(const std::string& device_file, const std::vector<std::string>& more)
     : device_file_(device_file),
       socket_path_(NewSocketPath()),
-      process_(EmulatorCommand(device_file, socket_path_)) {
+      process_(EmulatorCommand(device_file, socket_path_, more)) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::strncpy(address.sun_path, socket_path_.c_str(), sizeof address.sun_path - 1);

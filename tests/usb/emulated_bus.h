@@ -14,8 +14,9 @@ inline constexpr int kUsbRateHz = 250;
 
 class EmulatedBus {
  public:
-  /// Nothing is plugged in yet. `device_file` of config/devices. Throws std::runtime_error.
-  explicit EmulatedBus(const std::string& device_file);
+  /// Nothing is plugged in yet. `device_file` of config/devices; `more` settings of the emulated hand.
+  /// Throws std::runtime_error.
+  explicit EmulatedBus(const std::string& device_file, const std::vector<std::string>& more = {});
   ~EmulatedBus();
   EmulatedBus(const EmulatedBus&) = delete;
   EmulatedBus& operator=(const EmulatedBus&) = delete;
