@@ -11,7 +11,7 @@ void Bind(ConfigSchema& schema, Settings& settings) {
                 "world ticks per second: 10 to 60 is what the project is for");
   schema.Path("scene.file", &settings.scene.file, "the SDFormat world to run");
   schema.Number("physics.substep_ms", &settings.physics.substep_ms, 0.05, 10,
-                "longest step of the rigid-body engine: stacks need 1, lone bodies bear 5");
+                "longest step of bodies that a push reaches; the others choose theirs by themselves");
   schema.Choice<protocol::Coupling>(
       "coupling.coupling", &settings.coupling.coupling,
       {{"position", protocol::Coupling::kPosition},
