@@ -39,6 +39,7 @@ struct MovingBody {
 
   /// In the scene body's frame.
   BodyState State() const;
+  void SetState(const BodyState& state);
 };
 
 class BulletBodies {
