@@ -50,7 +50,7 @@ static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1
 class PlaneFinder {
  public:
   /// `scene` outlives this.
-  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+  explicit PlaneFinder(const Scene& scene);
 
   /// Fills `planes` nearest first, at most its length, and returns how many. Friction of finger and
   /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise.
@@ -64,6 +64,7 @@ class PlaneFinder {
 
   const Scene& scene_;
   NearBodies near_;
+  std::vector<BodyInertia> inertias_;        // of the bodies that can move
   std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
 };
 
