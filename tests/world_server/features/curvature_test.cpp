@@ -26,6 +26,8 @@ TEST_CASE("the ball bends as the surface does along the finger's way") {
     int round = 0;
     for (int i = 0; i < 300; ++i) {
       const NearestPoint nearest = FindNearestPoint(shape, 0.06 * vector());
+      // Not where the measuring way would go over the seam of side and cap.
+      if (shape.index() != 5 && std::abs(std::abs(nearest.point.z()) - 0.04) < 2e-4) continue;
       const Vec3 way = vector();
       const Vec3 along = (way - way.dot(nearest.normal) * nearest.normal).normalized();
       const double radius = RadiusAlong(shape, nearest, way);
