@@ -198,14 +198,15 @@ bool MayFace(const TriangleMesh& mesh, std::uint32_t node, const Vec3& p) {
   if (cone.half_angle >= std::numbers::pi / 2) return true;
   const Bounds& bounds = mesh.tree().nodes()[node].bounds;
   const Vec3 towards = p - (bounds.low + bounds.high) / 2;
-  const double radius = (bounds.high - bounds.low).norm() / 2;
-  const double distance = towards.norm();
-  if (distance <= radius) return true;
-  // Both angles are below a right one; together they may reach beyond it.
-  const double sine = radius / distance;
-  const double cosine = std::sqrt((1 - sine) * (1 + sine));
-  const double least = cone.cosine * cosine - cone.sine * sine;
-  return cone.axis.dot(towards) >= (least - kSlack) * distance;
+  const double squared_radius = (bounds.high - bounds.low).squaredNorm() / 4;
+  const double squared_tangent = towards.squaredNorm() - squared_radius;
+  if (squared_tangent <= 0) return true;
+  // Both angles, of the cone and of the ball about the node as p sees it, are below a right one;
+  // together they may reach beyond it.
+  const double radius = std::sqrt(squared_radius);
+  const double tangent = std::sqrt(squared_tangent);
+  return cone.axis.dot(towards) >=
+         cone.cosine * tangent - cone.sine * radius - kSlack * (tangent + radius);
 }
 
 void FindMinima(const TriangleMesh& mesh, const Vec3& p, double radius,

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "common/body_step.h"
+#include "world_server/features/curvature.h"
 
 namespace rikiseki::world {
 namespace {
@@ -16,13 +17,8 @@ bool Usable(const Vec3& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= kFarthest;
 }
 
-// 1/M_eff of the body at a point along a direction; 0 = it cannot move.
-double Mobility(const SceneBody& body, const BodyState& state, const Vec3& point,
-                const Vec3& direction) {
-  if (body.fixed) return 0;
-  return InverseEffectiveMass(BodyInertia::Of(body.mass_kg, body.inertia), state.pose, point,
-                              direction);
-}
+// Slower along its surface [m/s] a finger stays.
+constexpr double kStays = 1e-3;
 
 struct Candidate {
   double gap = 0;  // m, from the finger sphere's surface
@@ -51,6 +47,12 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
     if (sound && !known) fingers.push_back(finger);
   }
   return fingers;
+}
+
+PlaneFinder::PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {
+  for (const SceneBody& body : scene.bodies) {
+    inertias_.push_back(body.fixed ? BodyInertia() : BodyInertia::Of(body.mass_kg, body.inertia));
+  }
 }
 
 void PlaneFinder::Continue(const PlaneFinder& before, std::span<const BodyChange> changes) {
@@ -95,7 +97,8 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
         for (std::size_t i = 0; i < features.size(); ++i) {
           const Vec3 point = pose_WS * features[i].point;
           const Vec3 surface_velocity = state.VelocityAt(point);
-          const double speed = (finger.velocity - surface_velocity).norm();
+          const Vec3 relative = finger.velocity - surface_velocity;
+          const double speed = relative.norm();
           const double gap = features[i].distance - finger.radius_m;
           if (!(gap <= reach.radius_m + time_s * speed) || !point.allFinite()) continue;
 
@@ -112,10 +115,15 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .damping = collider.damping_ns_per_m.value_or(0),
                          .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
-                         .inverse_mass = Mobility(scene_body, state, point, normal)};
-          if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
-            found.plane.radius = ball->radius;
-          }
+                         .inverse_mass = scene_body.fixed
+                                             ? 0
+                                             : InverseEffectiveMass(inertias_[body], state.pose,
+                                                                    point, normal)};
+          const Vec3 along = relative - relative.dot(normal) * normal;
+          found.plane.radius =
+              RadiusAlong(collider.shape, features[i],
+                          along.norm() > kStays ? Vec3(pose_WS.orientation.conjugate() * along)
+                                                : Vec3(Vec3::Zero()));
           if (finger.friction > 0 && collider.friction > 0) {
             const double static_friction = collider.static_friction.value_or(collider.friction);
             found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);

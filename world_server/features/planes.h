@@ -51,7 +51,7 @@ static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1
 class PlaneFinder {
  public:
   /// `scene` outlives this.
-  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+  explicit PlaneFinder(const Scene& scene);
 
   /// Goes on with what `before` knows of the features of bodies that are the same.
   void Continue(const PlaneFinder& before, std::span<const BodyChange> changes);
@@ -68,6 +68,7 @@ class PlaneFinder {
 
   const Scene& scene_;
   NearBodies near_;
+  std::vector<BodyInertia> inertias_;        // of the bodies that can move
   std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
 };
 

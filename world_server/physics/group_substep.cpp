@@ -10,11 +10,6 @@
 namespace rikiseki::world {
 namespace {
 
-// What glides keeps its contacts, whether friction is part of the engine or not.
-bool RubsOn(const ContactPair& pair) {
-  return pair.first->getFriction() * pair.second->getFriction() > 0;
-}
-
 // Without friction there are no rows of it to sweep over. Only the pool's length is taken back: Bullet
 // still reads the rows, impulse 0 as they were made, when it writes the contacts back.
 class FrictionlessSolver final : public btSequentialImpulseConstraintSolver {
@@ -142,7 +137,6 @@ void GroupedWorld::FindContacts(const Group& group, double step_s) {
       const int second = pair->second_moving();
       if (pair->asked == substep_ || !(awake(first) || awake(second))) continue;
       pair->asked = substep_;
-      if (RubsOn(*pair)) DropStaleContacts(pair->manifolds, step_s);
       pairs_.Ask(*pair);
       const int sleeper = sleeps(first) ? first : sleeps(second) ? second : -1;
       if (sleeper < 0 || !WillTouch(*pair, step_s)) continue;
