@@ -74,7 +74,7 @@ void EndSubstep(btDiscreteDynamicsWorld& world, std::vector<HookedBody>& bodies,
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     HookedBody& body = bodies[i];
-    if (!body.rigid->isActive()) continue;
+    if (!body.rigid->isActive() || body.jointed) continue;
     const Vec3 change = FromBullet(body.rigid->getLinearVelocity()) - body.velocity;
     btTransform pose = body.rigid->getWorldTransform();
     pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * pushing[i].HalfAct(change)));

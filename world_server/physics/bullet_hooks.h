@@ -19,6 +19,7 @@ namespace rikiseki::world {
 struct HookedBody {
   btRigidBody* rigid = nullptr;
   BodyInertia inertia;
+  bool jointed = false;  // bullet_joints.h moves it
 
   // At the start of the substep, the kick included.
   Vec3 velocity = Vec3::Zero();

@@ -13,6 +13,7 @@
 #include "world_server/physics/air.h"
 #include "world_server/physics/bullet_contacts.h"
 #include "world_server/physics/bullet_hooks.h"
+#include "world_server/physics/bullet_joints.h"
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_rebound.h"
 #include "world_server/physics/bullet_shapes.h"
@@ -63,6 +64,7 @@ struct BulletWorld::Engine {
   btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
   std::vector<Body> bodies;  // in the scene's order
   std::vector<HookedBody> moving;
+  std::unique_ptr<BulletJoints> joints;
   std::vector<Drag> drags;           // of the bodies on which the air acts
   std::vector<double> restitutions;  // of rigid_bodies
   bool bounces = false;              // whether any of them is above 0
@@ -110,6 +112,12 @@ BulletWorld::Engine::Engine(const Scene& scene) {
   for (const SceneBody& body : scene.bodies) {
     body.fixed ? AddFixed(body) : AddMoving(body);
   }
+  std::vector<BulletJoints::Place> places;
+  for (const Body& body : bodies) {
+    places.push_back({.hooked = body.moving == kFixed ? nullptr : &moving[body.moving],
+                      .q_BP = body.q_BP});
+  }
+  joints = std::make_unique<BulletJoints>(scene, std::move(places), world);
 }
 
 void BulletWorld::Engine::AddFixed(const SceneBody& body) {
@@ -219,9 +227,14 @@ void BulletWorld::Engine::Substep(double step_s) {
     body.rigid->setAngularVelocity(ToBullet(state.angular_velocity));
     if (!drag.air.wind.isZero()) body.rigid->activate();
   }
+  joints->BeginSubstep(step_s);
   world.stepSimulation(step_s, 0);
   EndSubstep(world, moving, step_s);
-  if (bounces) Rebound(world, moving, restitutions, step_s);
+  joints->EndSubstep(step_s);
+  if (bounces) {
+    Rebound(world, moving, restitutions, step_s);
+    joints->ProjectVelocities();
+  }
 }
 
 BodyState BulletWorld::Engine::State(const Body& body) const {
@@ -296,6 +309,7 @@ BodyState BulletWorld::State(std::size_t body) const {
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   if (!engine_) return;
   for (const Kick& kick : kicks) engine_->Apply(kick);
+  if (!kicks.empty()) engine_->joints->ProjectVelocities();
   if (period_s > 0) {
     const int count = SubstepCount(period_s, longest_substep_s_);
     for (int done = 0; done < count; ++done) engine_->Substep(period_s / count);
@@ -308,7 +322,7 @@ void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
 
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
-  if (!engine_ || scene_.bodies[body].fixed) return false;
+  if (!engine_ || scene_.bodies[body].fixed || IsJointed(scene_, body)) return false;
   const std::size_t first = sites.size();
   if (!FindContactSites(scene_, states_, body, reach_m, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);

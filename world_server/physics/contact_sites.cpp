@@ -115,7 +115,7 @@ bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std
   for (const Collider& collider : scene.bodies[body].colliders) {
     const Pose pose_WS = state.pose * collider.pose_BS;
     for (std::size_t other = 0; other < scene.bodies.size(); ++other) {
-      if (other == body) continue;
+      if (other == body || !Collide(scene, body, other)) continue;
       const SceneBody& other_body = scene.bodies[other];
       for (const Collider& other_collider : other_body.colliders) {
         const Pose pose_WO = states[other].pose * other_collider.pose_BS;
