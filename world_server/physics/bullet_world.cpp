@@ -18,6 +18,7 @@
 #include "world_server/physics/bullet_rebound.h"
 #include "world_server/physics/bullet_shapes.h"
 #include "world_server/physics/contact_sites.h"
+#include "world_server/physics/jointed_solver.h"
 #include "world_server/scene/shape_size.h"
 
 namespace rikiseki::world {
@@ -58,7 +59,7 @@ struct BulletWorld::Engine {
   btCollisionDispatcher dispatcher{&configuration};
   std::vector<PairContact> contacts = ReplaceContacts(dispatcher);
   btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver solver;
+  JointedSolver solver;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
   std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;
   btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
@@ -104,6 +105,7 @@ BulletWorld::Engine::Engine(const Scene& scene) {
   info.m_erp2 = kPenetrationRecovery;
   resting_depth = 1e-4 * smallest;
   info.m_linearSlop = resting_depth;
+  if (!scene.joints.empty()) info.m_minimumSolverBatchSize = 1;  // the solver tells islands apart
   // With two directions friction is a box in velocity space, 20 % and 45 degrees wrong at any step;
   // with one, Bullet takes the direction of slip.
   info.m_solverMode &= ~SOLVER_USE_2_FRICTION_DIRECTIONS;

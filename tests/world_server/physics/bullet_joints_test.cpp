@@ -70,6 +70,7 @@ Scene Chain(int count, double first_kg, double ratio) {
   double mass = first_kg;
   for (int i = 0; i < count; ++i, mass *= ratio) {
     scene.bodies.push_back(Block({0.1, 0.01, 0.01}, mass, {.position = {0.1 * i + 0.05, 0, 0}}));
+    scene.bodies.back().model = 1;  // its links do not meet
     const std::size_t parent = i == 0 ? Joint::kWorld : static_cast<std::size_t>(i) - 1;
     scene.joints.push_back(JoinAt(scene, Joint::Type::kRevolute, parent,
                                   static_cast<std::size_t>(i), {0.1 * i, 0, 0}, Vec3::UnitY()));
