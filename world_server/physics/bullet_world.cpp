@@ -77,7 +77,7 @@ struct BulletWorld::Engine {
   }
 
   void AddFixed(const SceneBody& body);
-  void AddMoving(const SceneBody& body);
+  void AddMoving(const SceneBody& body, bool jointed);
   btRigidBody* Add(double mass, const Vec3& moments, btCollisionShape* shape,
                    const Collider& surface, const Pose& pose);
   void Apply(const Kick& kick);
@@ -112,7 +112,7 @@ BulletWorld::Engine::Engine(const Scene& scene) {
   world.getDispatchInfo().m_allowedCcdPenetration = 1e-5;
 
   for (const SceneBody& body : scene.bodies) {
-    body.fixed ? AddFixed(body) : AddMoving(body);
+    body.fixed ? AddFixed(body) : AddMoving(body, IsJointed(scene, bodies.size()));
   }
   std::vector<BulletJoints::Place> places;
   for (const Body& body : bodies) {
@@ -132,14 +132,14 @@ void BulletWorld::Engine::AddFixed(const SceneBody& body) {
   bodies.emplace_back();
 }
 
-void BulletWorld::Engine::AddMoving(const SceneBody& body) {
+void BulletWorld::Engine::AddMoving(const SceneBody& body, bool jointed) {
   const auto refuse = [&](const std::string& why) {
     throw std::invalid_argument("body " + body.name + ": " + why);
   };
   const PrincipalInertia inertia = Diagonalize(body.inertia);
   if (!(body.mass_kg > 0)) refuse("a moving body needs a mass");
   if (!(inertia.moments.minCoeff() > 0)) refuse("a moving body needs a positive inertia");
-  if (body.colliders.empty()) refuse("a moving body needs a shape");
+  if (body.colliders.empty() && !jointed) refuse("a moving body needs a shape, or a joint");
 
   double inner = 0;
   auto compound = std::make_unique<btCompoundShape>();
@@ -157,15 +157,16 @@ void BulletWorld::Engine::AddMoving(const SceneBody& body) {
     shapes.push_back(MakeBulletShape(collider.shape));
     compound->addChildShape(ToBullet(pose_PB * collider.pose_BS), shapes.back().get());
   }
-  btCollisionShape* shape = shapes.back().get();
-  const btTransform& placed = compound->getChildTransform(0);
-  if (body.colliders.size() > 1 || !(placed == btTransform::getIdentity())) {
+  btCollisionShape* shape = body.colliders.empty() ? nullptr : shapes.back().get();
+  if (body.colliders.size() != 1 ||
+      !(compound->getChildTransform(0) == btTransform::getIdentity())) {
     shape = compound.get();
     shapes.push_back(std::move(compound));
   }
 
   const Pose pose_WP = body.pose_WB * Pose{.orientation = inertia.orientation};
-  btRigidBody* rigid = Add(body.mass_kg, inertia.moments, shape, body.colliders.front(), pose_WP);
+  const Collider surface = body.colliders.empty() ? Collider{} : body.colliders.front();
+  btRigidBody* rigid = Add(body.mass_kg, inertia.moments, shape, surface, pose_WP);
   // The defaults (0.8 m/s, 1 rad/s) would put to sleep what a finger moves slowly.
   rigid->setSleepingThresholds(1e-5, 1e-4);
   rigid->setCcdMotionThreshold(inner / 2);
