@@ -38,14 +38,21 @@ ReadyScene Load(const Settings& settings) {
   return ready;
 }
 
+SceneUse UseOf(const Settings& settings) {
+  return {.coupling = settings.coupling.coupling,
+          .finger_friction = settings.features.finger_friction};
+}
+
 // Tells observers of every scene that runs, once.
 class SceneAnnouncer {
  public:
-  explicit SceneAnnouncer(const protocol::SegmentOwner& owner)
-      : writer_(owner.Stream(protocol::StreamType::kWorldScene)) {}
+  SceneAnnouncer(const protocol::SegmentOwner& owner, const SceneUse& use)
+      : writer_(owner.Stream(protocol::StreamType::kWorldScene)), use_(use) {}
 
   void Publish(const Scene& scene, const WorldStep& step) {
-    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_);
+    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_, use_);
+    spdlog::info("needs: {}", InWords(message.needs));
+    spdlog::info("left out: {}", InWords(message.left_out));
     if (!writer_.Publish(message, static_cast<std::uint64_t>(MonotonicNow()))) {
       spdlog::warn(
           "scene {} has grown beyond the room in world.scene: observers see the old shapes "
@@ -56,6 +63,7 @@ class SceneAnnouncer {
 
  private:
   protocol::SceneWriter writer_;
+  SceneUse use_;
   std::uint64_t revision_ = 0;
 };
 
@@ -134,7 +142,7 @@ int Run(int argc, char** argv) {
   const Scene& scene = ready.loaded.scene;
   if (options.check) {
     std::fputs(description.c_str(), stdout);
-    const SceneNeeds needs = WorkOutNeeds(scene);
+    const SceneNeeds needs = WorkOutNeeds(scene, UseOf(settings));
     std::printf("scene %s: %zu bodies\nneeds: %s\nleft out: %s\n", scene.name.c_str(),
                 scene.bodies.size(), InWords(needs.needs).c_str(), InWords(needs.left_out).c_str());
     return kExitOk;
@@ -161,7 +169,7 @@ int Run(int argc, char** argv) {
   WorldLoop loop(settings, step, owner, link);
   spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(),
                settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
-  SceneAnnouncer announcer(owner);
+  SceneAnnouncer announcer(owner, UseOf(settings));
   announcer.Publish(scene, step);
   RunUntilStopped(settings, step, loop, link, announcer);
   spdlog::info("stopped");

@@ -39,6 +39,7 @@ struct WorldStep::State {
   void ReadStates();
   void Advance(double period_s);
   void Penalise(double period_s);
+  void Push(std::span<const Kick> kicks, double period_s);
 };
 
 void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics) {
@@ -93,7 +94,14 @@ void WorldStep::State::Penalise(double period_s) {
   Vec3 penalty = ToVec3(health.penalty_impulse);
   for (const Kick& kick : kicks) penalty += kick.impulse;
   health.penalty_impulse = ToArray(penalty);
-  dynamics->ApplyAndStep(kicks, period_s);
+  Push(kicks, period_s);
+}
+
+// All at the start of the period.
+void WorldStep::State::Push(std::span<const Kick> kicks, double period_s) {
+  dynamics->ApplyAndStep(kicks, 0);
+  const Stretch whole{.length_s = period_s};
+  dynamics->Play({&whole, 1});
 }
 
 // Coupling and physics.
@@ -106,7 +114,7 @@ void WorldStep::State::Advance(double period_s) {
     ReplayPush(ledger.replay(), period_s, settings.coupling.force_cap_n * settings.gap_s(),
                *dynamics);
   } else {
-    dynamics->ApplyAndStep(ImpulseKicks(owed, states), period_s);
+    Push(ImpulseKicks(owed, states), period_s);
   }
   ReadStates();
 }

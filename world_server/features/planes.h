@@ -13,6 +13,7 @@
 #include "world_server/features/feature_track.h"
 #include "world_server/features/near_bodies.h"
 #include "world_server/physics/dynamics_world.h"
+#include "world_server/physics/linkage.h"
 #include "world_server/scene/scene.h"
 
 namespace rikiseki::world {
@@ -50,7 +51,7 @@ static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1
 class PlaneFinder {
  public:
   /// `scene` outlives this.
-  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+  explicit PlaneFinder(const Scene& scene);
 
   /// Fills `planes` nearest first, at most its length, and returns how many. Friction of finger and
   /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise.
@@ -62,8 +63,13 @@ class PlaneFinder {
  private:
   using TrackKey = std::array<std::size_t, 3>;  // pointer, body, collider
 
+  double Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                  const Vec3& normal) const;
+
   const Scene& scene_;
   NearBodies near_;
+  std::vector<Linkage> linkages_;
+  std::map<std::size_t, std::array<std::size_t, 2>> linked_;  // bodies: linkage, place in it
   std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
 };
 

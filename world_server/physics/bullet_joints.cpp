@@ -93,31 +93,29 @@ std::vector<BoundedRow> RowsOf(const Linkage& linkage, std::size_t place, double
 // A linkage, its bodies' states at the start of the substep, and its joints' rows in Bullet.
 struct BulletJoints::Joined {
   Linkage linkage;
-  btRigidBody ground{0, nullptr, nullptr};  // stands for what does not move
+  std::vector<std::size_t> places;                // of its bodies in `moving`
+  btRigidBody ground{0, nullptr, nullptr};        // stands for what does not move
   std::vector<std::unique_ptr<SolverRows>> rows;  // of the linkage's links
   std::vector<BodyState> start;
   std::vector<BodyState> guess;  // what the joints' last impulses gave to the velocities beforehand
-  bool touches = false;
-  bool awake = false;
 
   explicit Joined(Linkage given) : linkage(std::move(given)) {}
 };
 
-BulletJoints::BulletJoints(const Scene& scene, std::vector<Place> places,
+BulletJoints::BulletJoints(const Scene& scene, BulletBodies& bodies,
                            btDiscreteDynamicsWorld& world)
-    : places_(std::move(places)), world_(world), joined_of_(scene.bodies.size(), nullptr) {
+    : bodies_(bodies), world_(world), joined_of_(bodies.moving.size(), nullptr) {
   IgnorePairs(scene);
   for (Linkage& linkage : Linkage::Of(scene)) {
     joined_.push_back(std::make_unique<Joined>(std::move(linkage)));
     Joined& joined = *joined_.back();
-    const std::vector<std::size_t>& bodies = joined.linkage.bodies();
-    joined.start.resize(bodies.size());
-    for (const std::size_t body : bodies) {
-      joined_of_[body] = &joined;
-      places_[body].hooked->jointed = true;
+    for (const std::size_t body : joined.linkage.bodies()) {
+      joined.places.push_back(bodies.moving_of[body]);
+      joined_of_[joined.places.back()] = &joined;
     }
+    joined.start.resize(joined.places.size());
     const auto rigid = [&](std::size_t place) -> btRigidBody& {
-      return place == Joint::kWorld ? joined.ground : *places_[bodies[place]].hooked->rigid;
+      return place == Joint::kWorld ? joined.ground : *bodies.moving[joined.places[place]].rigid;
     };
     for (const Linkage::Link& link : joined.linkage.links()) {
       joined.rows.push_back(std::make_unique<SolverRows>(rigid(link.child), rigid(link.parent)));
@@ -133,23 +131,25 @@ BulletJoints::~BulletJoints() {
 }
 
 void BulletJoints::IgnorePairs(const Scene& scene) {
-  std::vector<std::vector<btCollisionObject*>> objects(scene.bodies.size());
-  btCollisionObjectArray& all = world_.getCollisionObjectArray();
-  for (int i = 0; i < all.size(); ++i) {
-    objects[static_cast<std::size_t>(all[i]->getUserIndex2())].push_back(all[i]);
+  std::vector<std::vector<btRigidBody*>> rigids(scene.bodies.size());
+  for (const auto& rigid : bodies_.rigid_bodies) {
+    rigids[static_cast<std::size_t>(rigid->getUserIndex2())].push_back(rigid.get());
   }
   const auto ignore = [&](std::size_t a, std::size_t b) {
-    for (btCollisionObject* first : objects[a]) {
-      for (btCollisionObject* second : objects[b]) first->setIgnoreCollisionCheck(second, true);
+    for (btRigidBody* first : rigids[a]) {
+      for (btRigidBody* second : rigids[b]) {
+        first->setIgnoreCollisionCheck(second, true);
+        second->setIgnoreCollisionCheck(first, true);
+      }
     }
   };
   std::map<std::uint32_t, std::vector<std::size_t>> models;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     if (scene.bodies[i].model != 0) models[scene.bodies[i].model].push_back(i);
   }
-  for (const auto& [model, bodies] : models) {
-    for (const std::size_t a : bodies) {
-      for (const std::size_t b : bodies) {
+  for (const auto& [model, members] : models) {
+    for (const std::size_t a : members) {
+      for (const std::size_t b : members) {
         if (a < b && !Collide(scene, a, b)) ignore(a, b);
       }
     }
@@ -161,143 +161,117 @@ void BulletJoints::IgnorePairs(const Scene& scene) {
   }
 }
 
-// As the engine has them now.
+// As the engine has them now, in the scene's frames.
 void BulletJoints::Read(const Joined& joined, std::span<BodyState> states) const {
-  const std::vector<std::size_t>& bodies = joined.linkage.bodies();
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const Place& place = places_[bodies[i]];
-    const btRigidBody& rigid = *place.hooked->rigid;
-    states[i] = {.pose = FromBullet(rigid.getWorldTransform()) *
-                         Pose{.orientation = place.q_BP.conjugate()},
-                 .velocity = FromBullet(rigid.getLinearVelocity()),
-                 .angular_velocity = FromBullet(rigid.getAngularVelocity())};
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    states[i] = bodies_.moving[joined.places[i]].State();
   }
 }
 
 void BulletJoints::WriteVelocities(const Joined& joined, std::span<const BodyState> states) {
-  const std::vector<std::size_t>& bodies = joined.linkage.bodies();
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    btRigidBody& rigid = *places_[bodies[i]].hooked->rigid;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    btRigidBody& rigid = *bodies_.moving[joined.places[i]].rigid;
     rigid.setLinearVelocity(ToBullet(states[i].velocity));
     rigid.setAngularVelocity(ToBullet(states[i].angular_velocity));
   }
 }
 
-// Whether any of its bodies is awake; then all are.
-bool BulletJoints::Wakes(const Joined& joined) {
-  const std::vector<std::size_t>& bodies = joined.linkage.bodies();
-  const auto active = [&](std::size_t body) { return places_[body].hooked->rigid->isActive(); };
-  if (std::none_of(bodies.begin(), bodies.end(), active)) return false;
-  for (const std::size_t body : bodies) {
-    if (!active(body)) places_[body].hooked->rigid->activate(true);
-  }
-  return true;
+std::span<const std::size_t> BulletJoints::Settle(std::size_t moving) {
+  const Joined* joined = joined_of_[moving];
+  if (joined == nullptr) return {};
+  std::vector<BodyState> states(joined->places.size());
+  Read(*joined, states);
+  joined->linkage.ProjectVelocities(states);
+  WriteVelocities(*joined, states);
+  return joined->places;
 }
 
-void BulletJoints::ProjectVelocities() {
-  for (const auto& joined : joined_) {
-    if (!Wakes(*joined)) continue;
-    std::vector<BodyState> states(joined->start.size());
-    Read(*joined, states);
-    joined->linkage.ProjectVelocities(states);
-    WriteVelocities(*joined, states);
-  }
-}
-
-void BulletJoints::BeginSubstep(double step_s) {
-  for (const auto& owned : joined_) {
-    Joined& joined = *owned;
-    joined.awake = Wakes(joined);
-    if (!joined.awake) continue;
-    const Linkage& linkage = joined.linkage;
-    Read(joined, joined.start);
-    std::vector<BodyState> states = joined.start;  // the drag included, `start` not
-    for (std::size_t i = 0; i < states.size(); ++i) {
-      const HookedBody& hooked = *places_[linkage.bodies()[i]].hooked;
-      joined.start[i].velocity = hooked.velocity;
-      joined.start[i].angular_velocity = hooked.angular_velocity;
+void BulletJoints::BeginSubstep(std::span<const std::size_t> stepped, double step_s) {
+  stepped_.clear();
+  for (const std::size_t place : stepped) {
+    Joined* found = joined_of_[place];
+    if (found == nullptr || found->places.front() != place) continue;
+    stepped_.push_back(found);
+    Joined& joined = *found;
+    std::vector<BodyState> states(joined.places.size());
+    Read(joined, states);
+    joined.start = states;
+    for (std::size_t i = 0; i < states.size(); ++i) {  // before the drag
+      joined.start[i].velocity = bodies_.moving[joined.places[i]].velocity;
+      joined.start[i].angular_velocity = bodies_.moving[joined.places[i]].angular_velocity;
     }
     joined.linkage.Begin(joined.start);
 
     // With what the joints gave last, contacts are solved under the load that they will bear.
     joined.guess = states;
-    linkage.GiveLastImpulses(joined.guess);
+    joined.linkage.GiveLastImpulses(states);
+    WriteVelocities(joined, states);
     for (std::size_t i = 0; i < states.size(); ++i) {
-      std::swap(joined.guess[i], states[i]);
       joined.guess[i].velocity = states[i].velocity - joined.guess[i].velocity;
       joined.guess[i].angular_velocity =
           states[i].angular_velocity - joined.guess[i].angular_velocity;
     }
-    WriteVelocities(joined, states);
     for (std::size_t i = 0; i < joined.rows.size(); ++i) {
-      joined.rows[i]->Set(RowsOf(linkage, i, step_s));
+      joined.rows[i]->Set(RowsOf(joined.linkage, i, step_s));
     }
   }
 }
 
-void BulletJoints::FindTouched() {
-  for (const auto& joined : joined_) joined->touches = false;
-  btDispatcher& dispatcher = *world_.getDispatcher();
-  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    bool pushes = false;
-    for (int j = 0; j < manifold.getNumContacts(); ++j) {
-      pushes = pushes || manifold.getContactPoint(j).m_appliedImpulse > 0;
-    }
-    if (!pushes) continue;
-    for (const btCollisionObject* object : {manifold.getBody0(), manifold.getBody1()}) {
-      Joined* joined = joined_of_[static_cast<std::size_t>(object->getUserIndex2())];
-      if (joined != nullptr) joined->touches = true;
+bool BulletJoints::Touches(const Joined& joined,
+                           std::span<btPersistentManifold* const> manifolds) const {
+  const auto is_own = [&](const btCollisionObject* object) {
+    return object->getUserIndex() >= 0 &&
+           joined_of_[static_cast<std::size_t>(object->getUserIndex())] == &joined;
+  };
+  for (const btPersistentManifold* manifold : manifolds) {
+    if (!is_own(manifold->getBody0()) && !is_own(manifold->getBody1())) continue;
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      if (manifold->getContactPoint(i).m_appliedImpulse > 0) return true;
     }
   }
+  return false;
 }
 
-void BulletJoints::EndSubstep(double step_s) {
-  FindTouched();
-  for (const auto& owned : joined_) {
-    Joined& joined = *owned;
-    if (!joined.awake) continue;
-    const std::vector<std::size_t>& bodies = joined.linkage.bodies();
-    std::vector<BodyState> states(bodies.size());
-    if (!places_[bodies.front()].hooked->rigid->isActive()) {  // fell asleep just now
-      WriteVelocities(joined, states);
-      continue;
-    }
-    Read(joined, states);
-    std::vector<Vec3> moved(bodies.size());  // otherwise than by the velocity: out of penetration
-    bool any_moved = false;
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      BodyState& state = states[i];
-      const Pose& start = joined.start[i].pose;
-      moved[i] = state.pose.position - start.position - step_s * state.velocity;
-      any_moved = any_moved || moved[i].cwiseAbs().maxCoeff() > kMoved;
-      state.pose = start;
-      state.velocity -= joined.guess[i].velocity;
-      state.angular_velocity -= joined.guess[i].angular_velocity;
-    }
-    for (std::size_t i = 0; i < joined.rows.size(); ++i) {
-      const Linkage::Link& link = joined.linkage.links()[i];
-      const btJointFeedback& given = joined.rows[i]->feedback();
-      const auto take_out = [&](std::size_t place, const btVector3& force, const btVector3& torque) {
-        if (place == Joint::kWorld) return;
-        ApplyImpulse(joined.linkage.inertias()[place], -step_s * FromBullet(force),
-                     -step_s * FromBullet(torque), states[place]);
-      };
-      take_out(link.child, given.m_appliedForceBodyA, given.m_appliedTorqueBodyA);
-      take_out(link.parent, given.m_appliedForceBodyB, given.m_appliedTorqueBodyB);
-    }
-    joined.linkage.End(joined.touches, step_s, states);
-    if (any_moved) {
-      for (std::size_t i = 0; i < bodies.size(); ++i) states[i].pose.position += moved[i];
-      joined.linkage.ProjectPositions(states);
-    }
-    for (std::size_t i = 0; i < bodies.size(); ++i) {
-      const Place& place = places_[bodies[i]];
-      const btTransform pose = ToBullet(states[i].pose * Pose{.orientation = place.q_BP});
-      place.hooked->rigid->setCenterOfMassTransform(pose);  // turns the inertia too
-    }
-    WriteVelocities(joined, states);
+void BulletJoints::EndSubstep(std::span<btPersistentManifold* const> manifolds, double step_s) {
+  for (Joined* joined : stepped_) End(*joined, Touches(*joined, manifolds), step_s);
+}
+
+void BulletJoints::End(Joined& joined, bool touches, double step_s) {
+  std::vector<BodyState> states(joined.places.size());
+  Read(joined, states);
+  std::vector<Vec3> moved(states.size());  // otherwise than by the velocity: out of penetration
+  bool any_moved = false;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    BodyState& state = states[i];
+    const Pose& start = joined.start[i].pose;
+    moved[i] = state.pose.position - start.position - step_s * state.velocity;
+    any_moved = any_moved || moved[i].cwiseAbs().maxCoeff() > kMoved;
+    state.pose = start;
+    state.velocity -= joined.guess[i].velocity;
+    state.angular_velocity -= joined.guess[i].angular_velocity;
   }
+  for (std::size_t i = 0; i < joined.rows.size(); ++i) {
+    const Linkage::Link& link = joined.linkage.links()[i];
+    const btJointFeedback& given = joined.rows[i]->feedback();
+    const auto take_out = [&](std::size_t place, const btVector3& force, const btVector3& torque) {
+      if (place == Joint::kWorld) return;
+      ApplyImpulse(joined.linkage.inertias()[place], -step_s * FromBullet(force),
+                   -step_s * FromBullet(torque), states[place]);
+    };
+    take_out(link.child, given.m_appliedForceBodyA, given.m_appliedTorqueBodyA);
+    take_out(link.parent, given.m_appliedForceBodyB, given.m_appliedTorqueBodyB);
+  }
+  joined.linkage.End(touches, step_s, states);
+  if (any_moved) {
+    for (std::size_t i = 0; i < states.size(); ++i) states[i].pose.position += moved[i];
+    joined.linkage.ProjectPositions(states);
+  }
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const MovingBody& body = bodies_.moving[joined.places[i]];
+    const Pose pose = states[i].pose * Pose{.orientation = body.q_BP};
+    body.rigid->setCenterOfMassTransform(ToBullet(pose));
+  }
+  WriteVelocities(joined, states);
 }
 
 }  // namespace rikiseki::world

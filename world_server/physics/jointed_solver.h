@@ -6,7 +6,7 @@
 
 namespace rikiseki::world {
 
-class JointedSolver final : public btSequentialImpulseConstraintSolver {
+class JointedSolver : public btSequentialImpulseConstraintSolver {
  public:
   static constexpr int kMostSweeps = 1000;
   static constexpr double kSettled = 1e-16;  // (m/s)^2: nothing changes by more in a sweep
