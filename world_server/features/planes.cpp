@@ -34,8 +34,8 @@ PlaneFinder::PlaneFinder(const Scene& scene)
 }
 
 // 1/M_eff of the body at a point against its normal, as its joints leave it; 0 = it cannot move.
-double PlaneFinder::Mobility(std::span<const BodyState> states, std::size_t body,
-                             const Vec3& point, const Vec3& normal) const {
+double PlaneFinder::Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                             const Vec3& normal) const {
   const SceneBody& b = scene_.bodies[body];
   if (b.fixed) return 0;
   const auto linked = linked_.find(body);

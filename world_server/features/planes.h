@@ -70,7 +70,7 @@ class PlaneFinder {
   NearBodies near_;
   std::vector<Linkage> linkages_;
   std::map<std::size_t, std::array<std::size_t, 2>> linked_;  // bodies: linkage, place in it
-  std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
+  std::map<TrackKey, FeatureTrack> tracks_;                   // of the last frame
 };
 
 }  // namespace rikiseki::world

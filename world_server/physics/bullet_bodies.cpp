@@ -41,7 +41,8 @@ BodyState MovingBody::State() const {
 BulletBodies::BulletBodies(const Scene& scene) {
   smallest = std::numeric_limits<double>::infinity();
   for (const SceneBody& body : scene.bodies) {
-    body.fixed ? AddFixed(body) : AddMoving(body, scene.gravity, IsJointed(scene, moving_of.size()));
+    body.fixed ? AddFixed(body)
+               : AddMoving(body, scene.gravity, IsJointed(scene, moving_of.size()));
   }
   if (!std::isfinite(smallest)) smallest = 1;  // nothing that moves has a shape
 }
@@ -56,8 +57,7 @@ void BulletBodies::AddFixed(const SceneBody& body) {
   moving_of.push_back(kFixed);
 }
 
-void BulletBodies::AddMoving(const SceneBody& body, const Vec3& gravity,
-                             bool jointed) {
+void BulletBodies::AddMoving(const SceneBody& body, const Vec3& gravity, bool jointed) {
   const auto refuse = [&](const std::string& why) {
     throw std::invalid_argument("body " + body.name + ": " + why);
   };

@@ -76,8 +76,7 @@ std::vector<BoundedRow> RowsOf(const Linkage& linkage, std::size_t place, double
   if (!link.has_axis()) return rows;
   const Joint& joint = link.joint;
   const JointRow& free = linkage.FreeRowOf(place);
-  const double hold =
-      step_s * (joint.friction + joint.damping * std::abs(linkage.Speed(place)));
+  const double hold = step_s * (joint.friction + joint.damping * std::abs(linkage.Speed(place)));
   if (hold > 0) rows.push_back({.row = free, .lowest = -hold, .highest = hold});
   if (std::isfinite(joint.upper)) {
     rows.push_back({.row = free, .rate = (joint.upper - link.position) / step_s, .highest = 0});
@@ -102,8 +101,7 @@ struct BulletJoints::Joined {
   explicit Joined(Linkage given) : linkage(std::move(given)) {}
 };
 
-BulletJoints::BulletJoints(const Scene& scene, BulletBodies& bodies,
-                           btDiscreteDynamicsWorld& world)
+BulletJoints::BulletJoints(const Scene& scene, BulletBodies& bodies, btDiscreteDynamicsWorld& world)
     : bodies_(bodies), world_(world), joined_of_(bodies.moving.size(), nullptr) {
   IgnorePairs(scene);
   for (Linkage& linkage : Linkage::Of(scene)) {

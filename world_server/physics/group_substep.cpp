@@ -34,7 +34,8 @@ std::unique_ptr<btSequentialImpulseConstraintSolver> MakeSolver(const EnginePart
   return std::make_unique<JointedSolver>();
 }
 
-GroupedWorld::GroupedWorld(const Scene& scene, btCollisionDispatcher& dispatcher, btDbvtBroadphase& broadphase,
+GroupedWorld::GroupedWorld(const Scene& scene, btCollisionDispatcher& dispatcher,
+                           btDbvtBroadphase& broadphase,
                            btSequentialImpulseConstraintSolver& solver,
                            btCollisionConfiguration& configuration, BulletBodies& bodies,
                            ContactPairs& pairs, Sleepers& sleepers, const EngineParts& parts,

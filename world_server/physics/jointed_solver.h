@@ -11,9 +11,8 @@ class JointedSolver : public btSequentialImpulseConstraintSolver {
   static constexpr int kMostSweeps = 1000;
   static constexpr double kSettled = 1e-16;  // (m/s)^2: nothing changes by more in a sweep
 
-  btScalar solveGroup(btCollisionObject** bodies, int body_count,
-                      btPersistentManifold** manifolds, int manifold_count,
-                      btTypedConstraint** constraints, int constraint_count,
+  btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
+                      int manifold_count, btTypedConstraint** constraints, int constraint_count,
                       const btContactSolverInfo& info, btIDebugDraw* drawer,
                       btDispatcher* dispatcher) override {
     btContactSolverInfo own = info;

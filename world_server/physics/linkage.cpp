@@ -17,12 +17,12 @@ using Eigen::VectorXd;
 // refinement takes its error out again.
 constexpr double kRegularization = 1e-10;
 constexpr int kRefinements = 2;
-constexpr double kExact = 1e-13;        // m or rad: joints are no farther apart
-constexpr double kPassed = 1e-12;       // m or rad: a limit is passed
-constexpr double kAtLimit = 1e-9;       // m or rad: a limit is reached
+constexpr double kExact = 1e-13;   // m or rad: joints are no farther apart
+constexpr double kPassed = 1e-12;  // m or rad: a limit is passed
+constexpr double kAtLimit = 1e-9;  // m or rad: a limit is reached
 constexpr int kLargestNewtonSteps = 40;
-constexpr int kFrictionSweeps = 50;     // over the joints of a linkage
-constexpr int kHalvings = 12;           // of a speed at which joints turn too far in a substep
+constexpr int kFrictionSweeps = 50;  // over the joints of a linkage
+constexpr int kHalvings = 12;        // of a speed at which joints turn too far in a substep
 
 Index At(std::size_t place) {
   return 6 * static_cast<Index>(place);
@@ -50,9 +50,8 @@ MatrixXd Yields(const MatrixXd& jacobian, std::span<const BodyInertia> inertias,
   MatrixXd yields(jacobian.cols(), jacobian.rows());
   for (std::size_t i = 0; i < inertias.size(); ++i) {
     yields.middleRows<3>(At(i)) = jacobian.middleCols<3>(At(i)).transpose() / inertias[i].mass_kg;
-    yields.middleRows<3>(At(i) + 3) =
-        inertias[i].InverseInertia(states[i].pose.orientation) *
-        jacobian.middleCols<3>(At(i) + 3).transpose();
+    yields.middleRows<3>(At(i) + 3) = inertias[i].InverseInertia(states[i].pose.orientation) *
+                                      jacobian.middleCols<3>(At(i) + 3).transpose();
   }
   return yields;
 }
@@ -101,7 +100,7 @@ std::vector<Linkage> Linkage::Of(const Scene& scene) {
     }
   }
   std::vector<Linkage> linkages;
-  std::vector<std::size_t> place(scene.bodies.size(), Joint::kWorld);  // within its linkage
+  std::vector<std::size_t> place(scene.bodies.size(), Joint::kWorld);       // within its linkage
   std::vector<std::size_t> linkage_of(scene.bodies.size(), Joint::kWorld);  // of a root
   for (const Joint& joint : scene.joints) {
     for (const std::size_t body : {joint.parent, joint.child}) {

@@ -114,7 +114,7 @@ class Linkage {
   std::vector<BodyState> start_;
   RowSystem held_;
   std::vector<JointRow> free_rows_;  // unset for a ball
-  Eigen::VectorXd impulses_;  // along the held rows, in the last substep
+  Eigen::VectorXd impulses_;         // along the held rows, in the last substep
 };
 
 }  // namespace rikiseki::world

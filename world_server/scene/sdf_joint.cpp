@@ -48,10 +48,10 @@ void ReadAxis(const sdf::Joint& sdf_joint, const sdf::JointAxis& axis, Joint& jo
     if (axis.Upper() < kUnlimited) joint.upper = axis.Upper();
     if (!(joint.lower <= 0 && joint.upper >= 0)) {
       const auto limit = FindExplicit(at, {"limit"});
-      Refuse(limit ? limit : at,
-             "joint " + sdf_joint.Name() + " starts at 0, outside its limits " +
-                 std::to_string(joint.lower) + " .. " + std::to_string(joint.upper) +
-                 "; put the links where the joint may be");
+      Refuse(limit ? limit : at, "joint " + sdf_joint.Name() + " starts at 0, outside its limits " +
+                                     std::to_string(joint.lower) + " .. " +
+                                     std::to_string(joint.upper) +
+                                     "; put the links where the joint may be");
     }
   }
   const std::string of = " of joint " + sdf_joint.Name();
@@ -166,8 +166,9 @@ SceneBody Merged(const SceneBody& first, const SceneBody& second) {
     const Pose pose = merged.pose_WB.Inverse() * part->pose_WB;  // of the part in the whole
     const Mat3 axes = pose.orientation.toRotationMatrix();
     const Vec3& off = pose.position;
-    merged.inertia += axes * part->inertia * axes.transpose() +
-                      part->mass_kg * (off.squaredNorm() * Mat3::Identity() - off * off.transpose());
+    merged.inertia +=
+        axes * part->inertia * axes.transpose() +
+        part->mass_kg * (off.squaredNorm() * Mat3::Identity() - off * off.transpose());
     for (Collider collider : part->colliders) {
       collider.pose_BS = pose * collider.pose_BS;
       merged.colliders.push_back(std::move(collider));

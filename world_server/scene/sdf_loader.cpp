@@ -285,8 +285,7 @@ class Loader {
       ReadForces(*link, *model, wind_, body, loaded_.warnings);
       if (model->LinkCount() > 1) body.model = number;
       const auto self_collide = FindExplicit(link->Element(), {"self_collide"});
-      body.self_collides =
-          model->SelfCollide() || (self_collide && self_collide->Get<bool>());
+      body.self_collides = model->SelfCollide() || (self_collide && self_collide->Get<bool>());
     }
     body.pose_WB = links_[place].pose_WL * pose_LB;
     for (std::uint64_t i = 0; i < link->CollisionCount(); ++i) {

@@ -126,7 +126,8 @@ TEST_CASE("a door kicked off its centre takes J r / I about its hinge, at once")
   // Nothing works on it then: it turns steadily, about its hinge. A second-order rule is (w h)^2 / 8
   // of the angle off.
   for (int i = 0; i < 40; ++i) world.ApplyAndStep({}, 0.05);
-  CHECK(AngleOf(world.State(0), Vec3::UnitZ()) == Approx(2 * speed).epsilon(speed * speed * kSubstep * kSubstep / 4));
+  CHECK(AngleOf(world.State(0), Vec3::UnitZ()) ==
+        Approx(2 * speed).epsilon(speed * speed * kSubstep * kSubstep / 4));
   CHECK(world.State(0).angular_velocity.z() == Approx(speed).epsilon(1e-9));
   CHECK(Apart(scene, States(world)) < 1e-11);
 }
@@ -310,8 +311,7 @@ TEST_CASE("a spinning top on its tip keeps energy and the momentum about the ver
   Scene scene;
   scene.bodies = {
       Block({0.1, 0.1, 0.02}, 0.5, {.position = tilted * Vec3(0, 0, 0.05), .orientation = tilted})};
-  scene.joints = {
-      JoinAt(scene, Joint::Type::kBall, Joint::kWorld, 0, Vec3::Zero(), Vec3::UnitZ())};
+  scene.joints = {JoinAt(scene, Joint::Type::kBall, Joint::kWorld, 0, Vec3::Zero(), Vec3::UnitZ())};
   BulletWorld world(scene, kSubstep);
   Push(world, 0, Vec3::Zero(), tilted * Vec3(0, 0, 0.5 * 0.02 / 12 * 100));  // 100 rad/s
   const double energy = Energy(scene, States(world));
@@ -321,7 +321,8 @@ TEST_CASE("a spinning top on its tip keeps energy and the momentum about the ver
     world.ApplyAndStep({}, kSubstep);
     lowest = std::min(lowest, world.State(0).pose.position.z());
   }
-  CAPTURE(Energy(scene, States(world)) / energy - 1, AngularMomentum(scene, States(world)).z() / spin - 1, lowest);
+  CAPTURE(Energy(scene, States(world)) / energy - 1,
+          AngularMomentum(scene, States(world)).z() / spin - 1, lowest);
   CHECK(Energy(scene, States(world)) == Approx(energy).epsilon(1e-4));
   CHECK(AngularMomentum(scene, States(world)).z() == Approx(spin).epsilon(1e-9));
   CHECK(lowest > 0.03);  // it does not fall
@@ -373,8 +374,8 @@ TEST_CASE("a bridge on a hinge rests on a block, and the block bears half of it"
   Scene scene;
   scene.bodies = {Floor(0.5), Block({0.6, 0.1, 0.02}, 4, {.position = {0.3, 0, 0.11}}),
                   Block({0.1, 0.1, 0.1}, 0.1, {.position = {0.55, 0, 0.05}})};
-  scene.joints = {JoinAt(scene, Joint::Type::kRevolute, Joint::kWorld, 1, {0, 0, 0.11},
-                         Vec3::UnitY())};
+  scene.joints = {
+      JoinAt(scene, Joint::Type::kRevolute, Joint::kWorld, 1, {0, 0, 0.11}, Vec3::UnitY())};
   BulletWorld world(scene, kSubstep);
   for (int i = 0; i < 100; ++i) world.ApplyAndStep({}, 0.05);
   const Vec3 rest = world.State(2).pose.position;

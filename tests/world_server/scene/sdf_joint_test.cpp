@@ -121,10 +121,10 @@ TEST_CASE("axes are expressed in any frame, and joints sit in any") {
 }
 
 TEST_CASE("links that are fixed to each other are one body with the mass of both") {
-  const LoadedScene loaded = LoadText(
-      Model(Link("a", "0 0 0 0 0 0.3") + Link("b", "1 0 0 0.5 0 0", "0.1 0 0 0 0 0.2") +
-            JointOf("fixed", "a", "b") + Link("c", "2 0 0 0 0 0") +
-            JointOf("revolute", "b", "c", "<axis><xyz>0 0 1</xyz></axis>")));
+  const LoadedScene loaded =
+      LoadText(Model(Link("a", "0 0 0 0 0 0.3") + Link("b", "1 0 0 0.5 0 0", "0.1 0 0 0 0 0.2") +
+                     JointOf("fixed", "a", "b") + Link("c", "2 0 0 0 0 0") +
+                     JointOf("revolute", "b", "c", "<axis><xyz>0 0 1</xyz></axis>")));
   CHECK(loaded.warnings.empty());
   const Scene& scene = loaded.scene;
   REQUIRE(scene.bodies.size() == 2);
@@ -143,19 +143,18 @@ TEST_CASE("links that are fixed to each other are one body with the mass of both
   };
   const Mat3 own = Vec3(0.01, 0.02, 0.025).asDiagonal();
   const Quat of_a(Eigen::AngleAxisd(0.3, Vec3::UnitZ()));
-  const Quat of_b = Quat(Eigen::AngleAxisd(0.5, Vec3::UnitX())) *
-                    Quat(Eigen::AngleAxisd(0.2, Vec3::UnitZ()));
+  const Quat of_b =
+      Quat(Eigen::AngleAxisd(0.5, Vec3::UnitX())) * Quat(Eigen::AngleAxisd(0.2, Vec3::UnitZ()));
   const Mat3 steiner = 2 * 2 * 0.55 * 0.55 * Vec3(0, 1, 1).asDiagonal().toDenseMatrix();
   const Mat3 expected = turned(own, of_a) + turned(own, of_b) + steiner;
   CHECK((turned(whole.inertia, whole.pose_WB.orientation) - expected).norm() < 1e-12);
 }
 
 TEST_CASE("what is fixed to the world, or to what is static, does not move") {
-  const LoadedScene loaded =
-      LoadText(Model(Link("a", "0 0 0 0 0 0") + JointOf("fixed", "world", "a") +
-                     Link("b", "1 0 0 0 0 0") + JointOf("fixed", "a", "b") +
-                     Link("c", "2 0 0 0 0 0") +
-                     JointOf("revolute", "b", "c", "<axis><xyz>0 0 1</xyz></axis>")));
+  const LoadedScene loaded = LoadText(
+      Model(Link("a", "0 0 0 0 0 0") + JointOf("fixed", "world", "a") + Link("b", "1 0 0 0 0 0") +
+            JointOf("fixed", "a", "b") + Link("c", "2 0 0 0 0 0") +
+            JointOf("revolute", "b", "c", "<axis><xyz>0 0 1</xyz></axis>")));
   REQUIRE(loaded.scene.bodies.size() == 3);
   CHECK(loaded.scene.bodies[0].fixed);
   CHECK(loaded.scene.bodies[1].fixed);
@@ -164,21 +163,21 @@ TEST_CASE("what is fixed to the world, or to what is static, does not move") {
   CHECK(loaded.scene.joints[0].parent == 1);
   CHECK_FALSE(Collide(loaded.scene, 1, 2));
 
-  const LoadedScene idle = LoadText(
-      Model("<static>1</static>" + Link("a", "0 0 0 0 0 0") + Link("b", "1 0 0 0 0 0") +
-            JointOf("revolute", "a", "b", "<axis><xyz>0 0 1</xyz></axis>")));
+  const LoadedScene idle =
+      LoadText(Model("<static>1</static>" + Link("a", "0 0 0 0 0 0") + Link("b", "1 0 0 0 0 0") +
+                     JointOf("revolute", "a", "b", "<axis><xyz>0 0 1</xyz></axis>")));
   CHECK(idle.scene.joints.empty());
   CHECK(idle.scene.bodies[1].fixed);
 }
 
 TEST_CASE("joints of nested models name their links, and links without a shape may hang on one") {
-  const LoadedScene loaded = LoadText(Model(
-      Model(Link("tip", "0 0 1 0 0 0"), "arm") + Link("base", "0 0 0 0 0 0") +
-      "<link name=\"dummy\"><inertial><mass>0.1</mass><inertia><ixx>1e-4</ixx><iyy>1e-4</iyy>"
-      "<izz>1e-4</izz></inertia></inertial></link>" +
-      JointOf("ball", "base", "dummy") +
-      "<joint name=\"j\" type=\"revolute\"><parent>dummy</parent><child>arm::tip</child>"
-      "<axis><xyz>1 0 0</xyz></axis></joint>"));
+  const LoadedScene loaded = LoadText(
+      Model(Model(Link("tip", "0 0 1 0 0 0"), "arm") + Link("base", "0 0 0 0 0 0") +
+            "<link name=\"dummy\"><inertial><mass>0.1</mass><inertia><ixx>1e-4</ixx><iyy>1e-4</iyy>"
+            "<izz>1e-4</izz></inertia></inertial></link>" +
+            JointOf("ball", "base", "dummy") +
+            "<joint name=\"j\" type=\"revolute\"><parent>dummy</parent><child>arm::tip</child>"
+            "<axis><xyz>1 0 0</xyz></axis></joint>"));
   CHECK(loaded.warnings.empty());
   REQUIRE(loaded.scene.bodies.size() == 3);
   CHECK(loaded.scene.bodies[1].name == "m::dummy");
@@ -201,9 +200,9 @@ TEST_CASE("links of one model collide only where the file says so") {
   CHECK_FALSE(Collide(scene_of(""), 0, 1));
   CHECK_FALSE(Collide(scene_of("<self_collide>false</self_collide>"), 0, 1));
   CHECK(Collide(scene_of("<self_collide>true</self_collide>"), 0, 1));
-  CHECK(Collide(LoadText(Model(Link("a", "0 0 0 0 0 0")) + Model(Link("b", "1 0 0 0 0 0"), "n"))
-                    .scene,
-                0, 1));
+  CHECK(Collide(
+      LoadText(Model(Link("a", "0 0 0 0 0 0")) + Model(Link("b", "1 0 0 0 0 0"), "n")).scene, 0,
+      1));
 }
 
 TEST_CASE("refused joints: file, line, and what would be right") {
@@ -215,8 +214,9 @@ TEST_CASE("refused joints: file, line, and what would be right") {
         "ball are. Two revolute joints with a link between them do what universal and revolute2 "
         "do");
   for (const char* type : {"universal", "revolute2", "gearbox"}) {
-    CHECK(Contains(Refusal(Model(links + JointOf(type, "a", "b", axis + "<axis2><xyz>1 0 0</xyz>"
-                                                                        "</axis2>"))),
+    CHECK(Contains(Refusal(Model(links + JointOf(type, "a", "b",
+                                                 axis + "<axis2><xyz>1 0 0</xyz>"
+                                                        "</axis2>"))),
                    "is not built"));
   }
   CHECK(Contains(Refusal(Model(links + JointOf("revolute", "a", "b"))), ".sdf:6: "));
