@@ -37,6 +37,7 @@ struct MovingBody {
 
   /// In the scene body's frame.
   BodyState State() const;
+  void SetState(const BodyState& state);
 };
 
 class BulletBodies {

@@ -13,6 +13,7 @@
 namespace rikiseki::world {
 namespace {
 
+constexpr double kTorn = 1e-6;    // m or rad: no substep leaves a joint so far apart
 constexpr double kMoved = 1e-12;  // m: Bullet moved a body otherwise than by its velocity
 
 // One row for Bullet's solver: the rate is to become `rate`, by an impulse within the bounds.
@@ -193,6 +194,8 @@ void BulletJoints::BeginSubstep(std::span<const std::size_t> stepped, double ste
     Joined& joined = *found;
     std::vector<BodyState> states(joined.places.size());
     Read(joined, states);
+    // Bodies that a new scene put elsewhere come together without the speed of doing so.
+    if (joined.linkage.Apart(states) > kTorn) joined.linkage.ProjectPositions(states);
     joined.start = states;
     for (std::size_t i = 0; i < states.size(); ++i) {  // before the drag
       joined.start[i].velocity = bodies_.moving[joined.places[i]].velocity;

@@ -10,7 +10,6 @@
 #include "world_server/physics/bullet_contacts.h"
 #include "world_server/physics/contact_impulses.h"
 #include "world_server/physics/contact_pairs.h"
-#include "world_server/physics/contact_sites.h"
 #include "world_server/physics/group_substep.h"
 #include "world_server/physics/islands.h"
 #include "world_server/physics/sleep.h"
@@ -253,6 +252,14 @@ void BulletWorld::ReadStates() {
   engine_->moved.clear();
 }
 
+void BulletWorld::SetState(std::size_t body, const BodyState& state) {
+  if (!engine_ || scene_.bodies[body].fixed) return;
+  const std::size_t place = engine_->bodies.moving_of[body];
+  engine_->sleepers.Wake(place);
+  engine_->bodies.moving[place].SetState(state);
+  states_[body] = state;
+}
+
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   if (!engine_) return;
   for (const Kick& kick : kicks) engine_->Apply(kick);
@@ -271,7 +278,7 @@ bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
   if (!engine_ || scene_.bodies[body].fixed || IsJointed(scene_, body)) return false;
   const std::size_t first = sites.size();
-  if (!FindContactSites(scene_, states_, body, reach_m, sites)) return false;
+  if (!site_finder_.Find(states_, body, reach_m, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);
   for (ContactSite& site : found) site.gap += engine_->resting_depth;
   const std::size_t place = engine_->bodies.moving_of[body];

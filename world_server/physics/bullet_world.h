@@ -15,6 +15,7 @@
 #include <memory>
 #include <vector>
 
+#include "world_server/physics/contact_sites.h"
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/physics/engine_parts.h"
 #include "world_server/scene/scene.h"
@@ -33,6 +34,7 @@ class BulletWorld final : public DynamicsWorld {
 
   std::size_t body_count() const override;
   BodyState State(std::size_t body) const override;
+  void SetState(std::size_t body, const BodyState& state) override;
   void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
   void Play(std::span<const Stretch> stretches) override;
   bool FindContacts(std::size_t body, double reach_m,
@@ -50,6 +52,7 @@ class BulletWorld final : public DynamicsWorld {
   void ReadStates();
 
   Scene scene_;
+  SiteFinder site_finder_{scene_};
   std::vector<BodyState> states_;  // of all bodies, now
   double substep_s_;
   std::unique_ptr<Engine> engine_;  // null where nothing moves

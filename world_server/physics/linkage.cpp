@@ -422,6 +422,10 @@ void Linkage::End(bool touches, double step_s, std::span<BodyState> states) {
   impulses_ = impulses.head(last.size()) + last;
 }
 
+double Linkage::Apart(std::span<const BodyState> states) const {
+  return Errors(states, {}).cwiseAbs().maxCoeff();
+}
+
 void Linkage::ProjectPositions(std::span<BodyState> states) const {
   std::vector<Stop> stops;
   do {

@@ -85,6 +85,9 @@ class Linkage {
   /// Ends the substep. In: velocities as all but the joints left them. Out: states at its end.
   void End(bool touches, double step_s, std::span<BodyState> states);
 
+  /// m or rad, how far any joint is from what it holds.
+  double Apart(std::span<const BodyState> states) const;
+
   /// Puts right what moved bodies otherwise, without giving velocity.
   void ProjectPositions(std::span<BodyState> states) const;
 

@@ -1,6 +1,6 @@
 // Reads a scene from an SDFormat world file through libsdformat: what its elements mean in SDF,
-// they mean here. What would change the motion and is not built (joints, meshes) is refused; what
-// is left unused otherwise (plugins, sensors) is named.
+// they mean here. What would change the motion and is not built is refused; what is left unused
+// otherwise (plugins, sensors) is named.
 #pragma once
 
 #include <string>
@@ -13,6 +13,7 @@ namespace rikiseki::world {
 struct LoadedScene {
   Scene scene;
   std::vector<std::string> warnings;  // "file:line: what is not used", one line each
+  std::vector<std::string> files;     // that it was read from: the scene's own first
 };
 
 /// Every link with collisions becomes a body, "model::link". Throws ConfigError with one line:
