@@ -29,6 +29,31 @@ struct Candidate {
 
 }  // namespace
 
+PlaneFinder::PlaneFinder(const Scene& scene)
+    : scene_(scene), near_(scene), linkages_(Linkage::Of(scene)) {
+  for (const SceneBody& body : scene.bodies) {
+    inertias_.push_back(body.fixed ? BodyInertia() : BodyInertia::Of(body.mass_kg, body.inertia));
+  }
+  for (std::size_t i = 0; i < linkages_.size(); ++i) {
+    const std::vector<std::size_t>& bodies = linkages_[i].bodies();
+    for (std::size_t place = 0; place < bodies.size(); ++place) linked_[bodies[place]] = {i, place};
+  }
+}
+
+// 1/M_eff of the body at a point against its normal, as its joints leave it; 0 = it cannot move.
+double PlaneFinder::Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                             const Vec3& normal) const {
+  if (scene_.bodies[body].fixed) return 0;
+  const auto linked = linked_.find(body);
+  if (linked == linked_.end()) {
+    return InverseEffectiveMass(inertias_[body], states[body].pose, point, normal);
+  }
+  const auto [linkage, place] = linked->second;
+  std::vector<BodyState> members;
+  for (const std::size_t member : linkages_[linkage].bodies()) members.push_back(states[member]);
+  return linkages_[linkage].InverseEffectiveMass(members, place, point, normal);
+}
+
 std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction) {
   std::vector<Finger> fingers;
   const std::size_t count = std::min(tick.pointer_count, protocol::kMaxPointers);
@@ -47,12 +72,6 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
     if (sound && !known) fingers.push_back(finger);
   }
   return fingers;
-}
-
-PlaneFinder::PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {
-  for (const SceneBody& body : scene.bodies) {
-    inertias_.push_back(body.fixed ? BodyInertia() : BodyInertia::Of(body.mass_kg, body.inertia));
-  }
 }
 
 void PlaneFinder::Continue(const PlaneFinder& before, std::span<const BodyChange> changes) {
@@ -115,10 +134,7 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .damping = collider.damping_ns_per_m.value_or(0),
                          .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
-                         .inverse_mass = scene_body.fixed
-                                             ? 0
-                                             : InverseEffectiveMass(inertias_[body], state.pose,
-                                                                    point, normal)};
+                         .inverse_mass = Mobility(states, body, point, normal)};
           const Vec3 along = relative - relative.dot(normal) * normal;
           found.plane.radius =
               RadiusAlong(collider.shape, features[i],

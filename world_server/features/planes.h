@@ -13,6 +13,7 @@
 #include "world_server/features/feature_track.h"
 #include "world_server/features/near_bodies.h"
 #include "world_server/physics/dynamics_world.h"
+#include "world_server/physics/linkage.h"
 #include "world_server/scene/scene.h"
 #include "world_server/scene/scene_change.h"
 
@@ -66,10 +67,15 @@ class PlaneFinder {
  private:
   using TrackKey = std::array<std::size_t, 3>;  // pointer, body, collider
 
+  double Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                  const Vec3& normal) const;
+
   const Scene& scene_;
   NearBodies near_;
-  std::vector<BodyInertia> inertias_;        // of the bodies that can move
-  std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
+  std::vector<BodyInertia> inertias_;  // of the bodies that can move
+  std::vector<Linkage> linkages_;
+  std::map<std::size_t, std::array<std::size_t, 2>> linked_;  // bodies: linkage, place in it
+  std::map<TrackKey, FeatureTrack> tracks_;                   // of the last frame
 };
 
 }  // namespace rikiseki::world
