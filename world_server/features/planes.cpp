@@ -16,14 +16,6 @@ bool Usable(const Vec3& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= kFarthest;
 }
 
-// 1/M_eff of the body at a point along a direction; 0 = it cannot move.
-double Mobility(const SceneBody& body, const BodyState& state, const Vec3& point,
-                const Vec3& direction) {
-  if (body.fixed) return 0;
-  return InverseEffectiveMass(BodyInertia::Of(body.mass_kg, body.inertia), state.pose, point,
-                              direction);
-}
-
 struct Candidate {
   double gap = 0;  // m, from the finger sphere's surface
   protocol::Plane plane;
@@ -32,6 +24,30 @@ struct Candidate {
 };
 
 }  // namespace
+
+PlaneFinder::PlaneFinder(const Scene& scene)
+    : scene_(scene), near_(scene), linkages_(Linkage::Of(scene)) {
+  for (std::size_t i = 0; i < linkages_.size(); ++i) {
+    const std::vector<std::size_t>& bodies = linkages_[i].bodies();
+    for (std::size_t place = 0; place < bodies.size(); ++place) linked_[bodies[place]] = {i, place};
+  }
+}
+
+// 1/M_eff of the body at a point against its normal, as its joints leave it; 0 = it cannot move.
+double PlaneFinder::Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                             const Vec3& normal) const {
+  const SceneBody& b = scene_.bodies[body];
+  if (b.fixed) return 0;
+  const auto linked = linked_.find(body);
+  if (linked == linked_.end()) {
+    return InverseEffectiveMass(BodyInertia::Of(b.mass_kg, b.inertia), states[body].pose, point,
+                                normal);
+  }
+  const auto [linkage, place] = linked->second;
+  std::vector<BodyState> members;
+  for (const std::size_t member : linkages_[linkage].bodies()) members.push_back(states[member]);
+  return linkages_[linkage].InverseEffectiveMass(members, place, point, normal);
+}
 
 std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction) {
   std::vector<Finger> fingers;
@@ -112,7 +128,7 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .damping = collider.damping_ns_per_m.value_or(0),
                          .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
-                         .inverse_mass = Mobility(scene_body, state, point, normal)};
+                         .inverse_mass = Mobility(states, body, point, normal)};
           if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
             found.plane.radius = ball->radius;
           }

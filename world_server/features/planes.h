@@ -13,6 +13,7 @@
 #include "world_server/features/feature_track.h"
 #include "world_server/features/near_bodies.h"
 #include "world_server/physics/dynamics_world.h"
+#include "world_server/physics/linkage.h"
 #include "world_server/scene/scene.h"
 #include "world_server/scene/scene_change.h"
 
@@ -51,7 +52,7 @@ static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1
 class PlaneFinder {
  public:
   /// `scene` outlives this.
-  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+  explicit PlaneFinder(const Scene& scene);
 
   /// Goes on with what `before` knows of the features of bodies that are the same.
   void Continue(const PlaneFinder& before, std::span<const BodyChange> changes);
@@ -66,9 +67,14 @@ class PlaneFinder {
  private:
   using TrackKey = std::array<std::size_t, 3>;  // pointer, body, collider
 
+  double Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                  const Vec3& normal) const;
+
   const Scene& scene_;
   NearBodies near_;
-  std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
+  std::vector<Linkage> linkages_;
+  std::map<std::size_t, std::array<std::size_t, 2>> linked_;  // bodies: linkage, place in it
+  std::map<TrackKey, FeatureTrack> tracks_;                   // of the last frame
 };
 
 }  // namespace rikiseki::world

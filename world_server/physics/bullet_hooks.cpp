@@ -73,6 +73,7 @@ void EndSubstep(std::span<btPersistentManifold* const> manifolds, std::vector<Mo
   }
   for (const std::size_t place : stepped) {
     MovingBody& body = moving[place];
+    if (body.jointed) continue;
     const Vec3 change = FromBullet(body.rigid->getLinearVelocity()) - body.velocity;
     btTransform pose = body.rigid->getWorldTransform();
     pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * body.pushing.HalfAct(change)));
