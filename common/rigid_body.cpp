@@ -43,8 +43,11 @@ void PushingContacts::Add(const Vec3& normal, double slip_speed) noexcept {
 }
 
 Vec3 PushingContacts::HalfAct(const Vec3& dv) const noexcept {
-  if (rank_ > 0 && !slips_) return Vec3::Zero();
-  Vec3 rest = dv;
+  return Sticks() ? Vec3(Vec3::Zero()) : Along(dv);
+}
+
+Vec3 PushingContacts::Along(const Vec3& v) const noexcept {
+  Vec3 rest = v;
   for (std::size_t i = 0; i < rank_; ++i) rest -= rest.dot(basis_[i]) * basis_[i];
   return rest;
 }

@@ -57,6 +57,11 @@ class PushingContacts {
   /// (0.5 mm in 5 s for 1 N on a sticking 1 kg block).
   Vec3 HalfAct(const Vec3& dv) const noexcept;
 
+  /// Whether there are contacts and all stick.
+  bool Sticks() const noexcept { return rank_ > 0 && !slips_; }
+  /// What of a velocity is along all of the contacts.
+  Vec3 Along(const Vec3& v) const noexcept;
+
  private:
   std::size_t rank_ = 0;
   Vec3 basis_[3];  // orthonormal, spans the normals

@@ -38,6 +38,15 @@ BodyState MovingBody::State() const {
           .angular_velocity = FromBullet(rigid->getAngularVelocity())};
 }
 
+void MovingBody::SetState(const BodyState& state) {
+  const btTransform pose = ToBullet(state.pose * Pose{.orientation = q_BP});
+  rigid->setWorldTransform(pose);
+  rigid->setInterpolationWorldTransform(pose);
+  rigid->setLinearVelocity(ToBullet(state.velocity));
+  rigid->setAngularVelocity(ToBullet(state.angular_velocity));
+  rigid->updateInertiaTensor();
+}
+
 BulletBodies::BulletBodies(const Scene& scene) {
   smallest = std::numeric_limits<double>::infinity();
   for (const SceneBody& body : scene.bodies) {

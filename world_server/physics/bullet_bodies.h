@@ -32,10 +32,14 @@ struct MovingBody {
   Vec3 angular_velocity = Vec3::Zero();
   Quat orientation = Quat::Identity();
   PushingContacts pushing;  // of this substep
-  double last_step_s = 0;   // length of the last substep that it was in
+  double grip = 0;          // N s, what friction could give in it at most
+
+  Vec3 last_velocity = Vec3::Zero();  // m/s, at the end of the last substep, before any kick
+  double last_step_s = 0;             // length of the last substep that it was in
 
   /// In the scene body's frame.
   BodyState State() const;
+  void SetState(const BodyState& state);
 };
 
 class BulletBodies {

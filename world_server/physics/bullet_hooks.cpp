@@ -2,6 +2,8 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <algorithm>
+
 #include "world_server/physics/bullet_math.h"
 
 namespace rikiseki::world {
@@ -22,6 +24,17 @@ Vec3 Slip(const btPersistentManifold& manifold, const btManifoldPoint& point) {
   return FromBullet(relative - relative.dot(normal) * normal);
 }
 
+// The way that a body slid before it came to stick within the substep: as friction can brake it, at most
+// as long as the substep. Not where a kick came, which friction may have undone.
+Vec3 LastWay(const MovingBody& body, double step_s) {
+  if (!body.pushing.Sticks() || body.velocity != body.last_velocity || !(body.grip > 0)) {
+    return Vec3::Zero();
+  }
+  const Vec3 lost = body.pushing.Along(body.velocity - FromBullet(body.rigid->getLinearVelocity()));
+  const double braking_s = step_s * std::min(1.0, lost.norm() * body.inertia.mass_kg / body.grip);
+  return braking_s / 2 * lost;
+}
+
 }  // namespace
 
 void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> stepped) {
@@ -31,6 +44,7 @@ void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> 
     body.angular_velocity = FromBullet(body.rigid->getAngularVelocity());
     body.orientation = FromBullet(body.rigid->getWorldTransform().getRotation());
     body.pushing = {};
+    body.grip = 0;
   }
 }
 
@@ -44,8 +58,9 @@ void EndSubstep(std::span<btPersistentManifold* const> manifolds, std::vector<Mo
       for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
         const int index = object->getUserIndex();
         if (index < 0) continue;
-        moving[static_cast<std::size_t>(index)].pushing.Add(FromBullet(point.m_normalWorldOnB),
-                                                            slip);
+        MovingBody& body = moving[static_cast<std::size_t>(index)];
+        body.pushing.Add(FromBullet(point.m_normalWorldOnB), slip);
+        body.grip += point.m_combinedFriction * point.m_appliedImpulse;
       }
     }
   }
@@ -53,7 +68,8 @@ void EndSubstep(std::span<btPersistentManifold* const> manifolds, std::vector<Mo
     MovingBody& body = moving[place];
     const Vec3 change = FromBullet(body.rigid->getLinearVelocity()) - body.velocity;
     btTransform pose = body.rigid->getWorldTransform();
-    pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * body.pushing.HalfAct(change)));
+    pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * body.pushing.HalfAct(change)) +
+                   ToBullet(LastWay(body, step_s)));
     if (precess && !body.inertia.isotropic) {
       BodyState state{.pose = {.orientation = body.orientation},
                       .angular_velocity = FromBullet(body.rigid->getAngularVelocity())};

@@ -94,7 +94,7 @@ struct BulletWorld::Engine {
                   bool long_substeps);
   void StepGroup(const Group& group, std::size_t place, std::span<const FineStep> steps,
                  double window_s, double substep_s, bool long_substeps);
-  void Step(const Group& group, double length_s, double longest_s);
+  void Step(const Group& group, double length_s, double longest_s, int sweeps);
 };
 
 // A push is on its way, or has come: its body wakes.
@@ -124,9 +124,9 @@ void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
 }
 
 // Of a group alone.
-void BulletWorld::Engine::Step(const Group& group, double length_s, double longest_s) {
+void BulletWorld::Engine::Step(const Group& group, double length_s, double longest_s, int sweeps) {
   const int count = SubstepCount(length_s, longest_s);
-  for (int done = 0; done < count; ++done) world.Step(group, length_s / count);
+  for (int done = 0; done < count; ++done) world.Step(group, length_s / count, sweeps);
   substeps += static_cast<std::uint64_t>(count);
 }
 
@@ -134,10 +134,11 @@ void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
                                     std::span<const FineStep> steps, double window_s,
                                     double substep_s, bool long_substeps) {
   const GroupMotion motion = MotionOf(group, bodies, sleepers);
+  const int sweeps = Sweeps(motion);
   const bool is_pushed = std::any_of(group.members.begin(), group.members.end(),
                                      [this](std::size_t body) { return pushed[body] != 0; });
   if (!is_pushed && long_substeps) {
-    if (window_s > 0) Step(group, window_s, CoarseSubstep(motion, substep_s, window_s));
+    if (window_s > 0) Step(group, window_s, CoarseSubstep(motion, substep_s, window_s), sweeps);
     return;
   }
   const double longest_s = PushedSubstep(motion, substep_s);
@@ -146,7 +147,7 @@ void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
       const std::size_t body = bodies.moving_of[push.body];
       if (body != BulletBodies::kFixed && islands.GroupOf(body) == place) Apply(push);
     }
-    if (step.length_s > 0) Step(group, step.length_s, longest_s);
+    if (step.length_s > 0) Step(group, step.length_s, longest_s, sweeps);
   }
 }
 
@@ -244,8 +245,17 @@ void BulletWorld::ReadStates() {
   for (const std::size_t place : engine_->moved) {
     const MovingBody& body = engine_->bodies.moving[place];
     states_[static_cast<std::size_t>(body.rigid->getUserIndex2())] = body.State();
+    engine_->islands.UpdateBox(place);
   }
   engine_->moved.clear();
+}
+
+void BulletWorld::SetState(std::size_t body, const BodyState& state) {
+  if (!engine_ || scene_.bodies[body].fixed) return;
+  const std::size_t place = engine_->bodies.moving_of[body];
+  engine_->sleepers.Wake(place);
+  engine_->bodies.moving[place].SetState(state);
+  states_[body] = state;
 }
 
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
@@ -265,11 +275,12 @@ void BulletWorld::Play(std::span<const Stretch> stretches) {
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
   if (!engine_ || scene_.bodies[body].fixed) return false;
+  const std::size_t place = engine_->bodies.moving_of[body];
+  const std::vector<std::size_t> others = engine_->islands.Near(place, reach_m);
   const std::size_t first = sites.size();
-  if (!site_finder_.Find(states_, body, reach_m, sites)) return false;
+  if (!site_finder_.Find(states_, body, reach_m, others, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);
   for (ContactSite& site : found) site.gap += engine_->resting_depth;
-  const std::size_t place = engine_->bodies.moving_of[body];
   const MovingBody& moving = engine_->bodies.moving[place];
   // Of a substep as long as those of what is pushed, however long the last one was.
   const double scale = moving.last_step_s > substep_s_ ? substep_s_ / moving.last_step_s : 1;

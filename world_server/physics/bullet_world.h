@@ -34,6 +34,7 @@ class BulletWorld final : public DynamicsWorld {
 
   std::size_t body_count() const override;
   BodyState State(std::size_t body) const override;
+  void SetState(std::size_t body, const BodyState& state) override;
   void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
   void Play(std::span<const Stretch> stretches) override;
   bool FindContacts(std::size_t body, double reach_m,

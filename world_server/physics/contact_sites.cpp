@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "common/body_step.h"
 #include "world_server/features/nearest_point.h"
@@ -111,7 +112,7 @@ SiteFinder::SiteFinder(const Scene& scene) : scene_(scene) {
 }
 
 bool SiteFinder::Find(std::span<const BodyState> states, std::size_t body, double reach_m,
-                      std::vector<ContactSite>& sites) const {
+                      std::span<const std::size_t> others, std::vector<ContactSite>& sites) const {
   const std::size_t first = sites.size();
   const BodyState& state = states[body];
   const Pose pose_BW = state.pose.Inverse();
@@ -119,7 +120,7 @@ bool SiteFinder::Find(std::span<const BodyState> states, std::size_t body, doubl
     const Collider& collider = scene_.bodies[body].colliders[place];
     const Pose pose_WS = state.pose * collider.pose_BS;
     const auto* ellipsoid = std::get_if<Ellipsoid>(&collider.shape);
-    for (std::size_t other = 0; other < bodies_.size(); ++other) {
+    for (const std::size_t other : others) {
       if (other == body) continue;
       const SceneBody& other_body = scene_.bodies[other];
       for (std::size_t i = 0; i < bodies_[other].solids.size(); ++i) {
@@ -160,6 +161,13 @@ bool SiteFinder::Find(std::span<const BodyState> states, std::size_t body, doubl
                      return std::round(a.gap / kSameGap) < std::round(b.gap / kSameGap);
                    });
   return true;
+}
+
+bool SiteFinder::Find(std::span<const BodyState> states, std::size_t body, double reach_m,
+                      std::vector<ContactSite>& sites) const {
+  std::vector<std::size_t> all(bodies_.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return Find(states, body, reach_m, all, sites);
 }
 
 }  // namespace rikiseki::world

@@ -18,9 +18,12 @@ class SiteFinder {
   /// `scene` outlives this.
   explicit SiteFinder(const Scene& scene);
 
-  /// Appends the contacts of `body` with a gap of at most `reach_m`, deepest first; false, and nothing
-  /// appended, if a pair that bounces is within reach. `states` go with the scene's bodies; impulses
-  /// are left at zero.
+  /// Appends the contacts of `body` with those of `others`, which ascend, that have a gap of at most
+  /// `reach_m`, deepest first; false, and nothing appended, if a pair that bounces is within reach.
+  /// `states` go with the scene's bodies; impulses are left at zero.
+  bool Find(std::span<const BodyState> states, std::size_t body, double reach_m,
+            std::span<const std::size_t> others, std::vector<ContactSite>& sites) const;
+  /// With all of the scene.
   bool Find(std::span<const BodyState> states, std::size_t body, double reach_m,
             std::vector<ContactSite>& sites) const;
 

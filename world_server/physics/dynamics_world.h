@@ -59,6 +59,10 @@ class DynamicsWorld {
   virtual std::size_t body_count() const = 0;
   virtual BodyState State(std::size_t body) const = 0;
 
+  /// Puts a moving body somewhere, at some velocity, between two steps: where a scene that takes
+  /// another's place goes on with a body of it.
+  virtual void SetState(std::size_t body, const BodyState& state) = 0;
+
   /// v += J/m and w += I^-1 L for every kick, then advances by `period_s` >= 0. Kicks of fixed bodies
   /// are ignored. The one place where impulses enter the dynamics.
   virtual void ApplyAndStep(std::span<const Kick> kicks, double period_s) = 0;

@@ -39,9 +39,11 @@ GroupedWorld::GroupedWorld(btCollisionDispatcher& dispatcher, btDbvtBroadphase& 
       sleepers_(sleepers),
       parts_(parts) {
   btContactSolverInfo& info = getSolverInfo();
-  info.m_numIterations = 50;
   info.m_leastSquaresResidualThreshold = 0;  // always all iterations: no early end, same bits
-  info.m_splitImpulse = 1;                   // penetration is mended without giving velocity
+  // The whole of the last substep's impulses: with less, each substep lets a stack sink a little into
+  // motion, and it creeps.
+  info.m_warmstartingFactor = 1;
+  info.m_splitImpulse = 1;  // penetration is mended without giving velocity
   info.m_splitImpulsePenetrationThreshold = -kDeepPenetration;
   info.m_erp2 = kPenetrationRecovery;
   info.m_linearSlop = resting_depth;
@@ -195,7 +197,8 @@ void GroupedWorld::Solve(const Group& group, double step_s) {
   for (btRigidBody* rigid : rigids_) rigid->clearForces();
 }
 
-void GroupedWorld::Step(const Group& group, double step_s) {
+void GroupedWorld::Step(const Group& group, double step_s, int sweeps) {
+  getSolverInfo().m_numIterations = sweeps;
   FindStepped(group);
   if (parts_.fast_bodies) SweepFastBodies(group, step_s);
   FindContacts(group, step_s);
@@ -205,7 +208,11 @@ void GroupedWorld::Step(const Group& group, double step_s) {
   integrateTransformsInternal(rigids_.data(), static_cast<int>(rigids_.size()), step_s);
   EndSubstep(manifolds_, bodies_.moving, stepped_, step_s, parts_.rotation);
   if (parts_.rebound) Rebound(manifolds_, bodies_, gravity_, step_s);
-  for (const std::size_t place : stepped_) bodies_.moving[place].last_step_s = step_s;
+  for (const std::size_t place : stepped_) {
+    MovingBody& body = bodies_.moving[place];
+    body.last_step_s = step_s;
+    body.last_velocity = FromBullet(body.rigid->getLinearVelocity());
+  }
 }
 
 }  // namespace rikiseki::world

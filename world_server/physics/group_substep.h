@@ -28,8 +28,8 @@ class GroupedWorld final : public btDiscreteDynamicsWorld {
                const EngineParts& parts, double resting_depth);
   ~GroupedWorld() override;
 
-  /// Advances the group's awake bodies. Who sleeps and is about to be touched wakes first.
-  void Step(const Group& group, double step_s);
+  /// Advances the group's awake bodies; the solver goes `sweeps` times over its contacts. Who sleeps and is about to be touched wakes first.
+  void Step(const Group& group, double step_s, int sweeps);
 
  private:
   void FindStepped(const Group& group);

@@ -8,14 +8,19 @@
 namespace rikiseki::world {
 namespace {
 
-constexpr double kMargin = 1e-3;         // m
-constexpr double kLeastSpeed = 1. / 64;  // m/s
-constexpr double kTooLarge = 1e12;       // m^2
+constexpr double kMargin = 1e-3;  // m
+constexpr double kSpare = 1.5;
+constexpr std::size_t kNoGroup = static_cast<std::size_t>(-1);
+constexpr double kTooLarge = 1e12;  // m^2
 
-// The next power of two: a group that gets a little faster need not be asked again.
-double RoundedUp(double speed) {
-  if (!(speed > kLeastSpeed)) return kLeastSpeed;
-  return std::exp2(std::ceil(std::log2(speed)));
+// m, how far two boxes are apart at least; 0 = they overlap.
+double Apart(const btBroadphaseProxy& a, const btBroadphaseProxy& b) {
+  double apart = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    apart = std::max({apart, double{a.m_aabbMin[axis] - b.m_aabbMax[axis]},
+                      double{b.m_aabbMin[axis] - a.m_aabbMax[axis]}});
+  }
+  return apart;
 }
 
 class Overlaps final : public btBroadphaseAabbCallback {
@@ -49,9 +54,8 @@ Islands::Islands(BulletBodies& bodies, ContactPairs& pairs, Sleepers& sleepers,
       joints_of_(bodies.moving.size()),
       plan_of_(bodies.moving.size()),
       parents_(bodies.moving.size()),
-      speeds_(bodies.moving.size()),
+      reaches_(bodies.moving.size()),
       asked_(bodies.moving.size()),
-      united_(bodies.moving.size()),
       numbers_(bodies.moving.size()),
       group_of_(bodies.moving.size()) {}
 
@@ -85,9 +89,9 @@ std::size_t Islands::RootOf(std::size_t body) {
 void Islands::AddAlone(std::size_t body) {
   plan_of_[body] = plan_;
   parents_[body] = body;
-  united_[body] = {body};
-  asked_[body] = 0;
-  speeds_[body] = sleepers_.Sleeps(body) ? 0 : SpeedOf(body);
+  numbers_[body] = kNoGroup;
+  asked_[body] = -1;
+  reaches_[body] = sleepers_.Sleeps(body) ? 0 : kSpare * window_s_ * SpeedOf(body);
   members_.push_back(body);
   to_ask_.push_back(body);
 }
@@ -103,36 +107,33 @@ void Islands::Add(std::size_t body) {
   }
 }
 
-void Islands::AddJoined(std::size_t body) {
+// What `body` may set in motion after a gap comes so much less far.
+void Islands::Reach(std::size_t body, std::size_t other, double gap_m) {
+  Add(other);
+  Unite(body, other);
+  const double left = reaches_[body] - gap_m;
+  if (left <= reaches_[other]) return;
+  reaches_[other] = left;
+  to_ask_.push_back(other);
+}
+
+void Islands::AskJoined(std::size_t body) {
   for (const btTypedConstraint* joint : joints_of_[body]) {
     for (const btRigidBody* rigid : {&joint->getRigidBodyA(), &joint->getRigidBodyB()}) {
-      if (rigid->getUserIndex() < 0) continue;
-      const auto other = static_cast<std::size_t>(rigid->getUserIndex());
-      Add(other);
-      Unite(body, other);
+      const int other = rigid->getUserIndex();
+      if (other >= 0) Reach(body, static_cast<std::size_t>(other), 0);
     }
   }
 }
 
 void Islands::Unite(std::size_t a, std::size_t b) {
-  std::size_t root = RootOf(a);
-  std::size_t other = RootOf(b);
-  if (root == other) return;
-  if (united_[root].size() < united_[other].size()) std::swap(root, other);
-  const double speed = std::max(speeds_[root], speeds_[other]);
-  for (const std::size_t side : {root, other}) {
-    if (RoundedUp(speed) <= RoundedUp(speeds_[side])) continue;
-    to_ask_.insert(to_ask_.end(), united_[side].begin(), united_[side].end());
-  }
-  parents_[other] = root;
-  speeds_[root] = speed;
-  united_[root].insert(united_[root].end(), united_[other].begin(), united_[other].end());
-  united_[other].clear();
+  const std::size_t root = RootOf(a);
+  const std::size_t other = RootOf(b);
+  parents_[std::max(root, other)] = std::min(root, other);
 }
 
-// Twice the way: whoever comes to meet it is no faster, or asks itself.
-void Islands::Ask(std::size_t body, double reach_m) {
-  btRigidBody& rigid = *bodies_.moving[body].rigid;
+// Others whose boxes are that near.
+std::vector<btRigidBody*> Islands::Overlapping(const btRigidBody& rigid, double reach_m) {
   const btBroadphaseProxy& proxy = *rigid.getBroadphaseHandle();
   const btVector3 reach(reach_m, reach_m, reach_m);
   const btVector3 low = proxy.m_aabbMin - reach;
@@ -140,16 +141,39 @@ void Islands::Ask(std::size_t body, double reach_m) {
   std::vector<btRigidBody*> found;
   Overlaps overlaps(low, high, found);
   broadphase_.aabbTest(low, high, overlaps);
-  for (btRigidBody* other : found) {
-    if (other == &rigid) continue;
+  std::erase(found, &rigid);
+  return found;
+}
+
+void Islands::Ask(std::size_t body, double reach_m) {
+  btRigidBody& rigid = *bodies_.moving[body].rigid;
+  for (btRigidBody* other : Overlapping(rigid, reach_m)) {
     ContactPair* pair = pairs_.Plan(rigid, *other, plan_);
     if (pair == nullptr) continue;
     planned_.push_back(pair);
     if (other->getUserIndex() < 0) continue;
-    const auto place = static_cast<std::size_t>(other->getUserIndex());
-    Add(place);
-    Unite(body, place);
+    Reach(body, static_cast<std::size_t>(other->getUserIndex()),
+          Apart(*rigid.getBroadphaseHandle(), *other->getBroadphaseHandle()));
   }
+}
+
+std::vector<std::size_t> Islands::Near(std::size_t body, double reach_m) {
+  std::vector<std::size_t> near;
+  for (const btRigidBody* other : Overlapping(*bodies_.moving[body].rigid, reach_m)) {
+    near.push_back(static_cast<std::size_t>(other->getUserIndex2()));
+  }
+  std::sort(near.begin(), near.end());
+  near.erase(std::unique(near.begin(), near.end()), near.end());
+  return near;
+}
+
+void Islands::UpdateBox(std::size_t body) {
+  btRigidBody& rigid = *bodies_.moving[body].rigid;
+  btVector3 low, high;
+  rigid.getAabb(low, high);
+  // Who was thrown out of the world meets nobody any more.
+  if (!((high - low).length2() < kTooLarge)) return;
+  broadphase_.setAabb(rigid.getBroadphaseHandle(), low, high, world_.getDispatcher());
 }
 
 std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_speed) {
@@ -160,23 +184,16 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
   members_.clear();
   to_ask_.clear();
   planned_.clear();
-  for (const std::size_t body : sleepers_.awake()) {
-    btRigidBody& rigid = *bodies_.moving[body].rigid;
-    btVector3 low, high;
-    rigid.getAabb(low, high);
-    // Who was thrown out of the world meets nobody any more.
-    if (!((high - low).length2() < kTooLarge)) continue;
-    broadphase_.setAabb(rigid.getBroadphaseHandle(), low, high, world_.getDispatcher());
-  }
+  for (const std::size_t body : sleepers_.awake()) UpdateBox(body);
   for (const std::size_t body : sleepers_.awake()) Add(body);
   while (!to_ask_.empty()) {
     const std::size_t body = to_ask_.back();
     to_ask_.pop_back();
-    if (asked_[body] == 0) AddJoined(body);
-    const double speed = RoundedUp(speeds_[RootOf(body)]);
-    if (asked_[body] >= speed) continue;
-    asked_[body] = speed;
-    if (contacts_) Ask(body, 2 * speed * window_s + kMargin);
+    if (asked_[body] >= reaches_[body]) continue;
+    asked_[body] = reaches_[body];
+    AskJoined(body);
+    // Twice the way: whoever comes to meet it reaches no farther, or asks itself.
+    if (contacts_) Ask(body, 2 * reaches_[body] + kMargin);
   }
 
   std::sort(members_.begin(), members_.end());
@@ -185,8 +202,7 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
     pairs_.DropOthers(body, plan_);
     // The first member that comes by makes the group.
     const std::size_t root = RootOf(body);
-    if (!united_[root].empty()) {
-      united_[root].clear();
+    if (numbers_[root] == kNoGroup) {
       numbers_[root] = count;
       if (groups_.size() == count) groups_.emplace_back();
       groups_[count] = {};

@@ -1,8 +1,9 @@
 // Who could meet whom within a short window of time. Bodies that could are one group; groups know nothing
 // of each other until the window has passed, so that each may be stepped alone and in its own steps.
 //
-// A body reaches as far as the fastest of its group could carry it, pushes of the window included, with a
-// factor of 1 to 2 to spare; a sleeping island that is within reach is part of the group, asleep. All
+// A body reaches as far as its speed carries it, pushes of the window included and half as much again; whom
+// it may hit, as far as is left of that after the gap. A sleeping island within reach is part of the group,
+// asleep. All
 // follows from numbers and places, never from addresses.
 #pragma once
 
@@ -33,6 +34,12 @@ class Islands {
   /// is what the pushes of the window may add. Valid until the next plan.
   std::span<Group> Plan(double window_s, std::span<const double> pushed_speed);
 
+  /// Keeps the broad phase true to where the body is.
+  void UpdateBox(std::size_t body);
+  /// The scene's bodies that may be within `reach_m` of a moving body where it was at UpdateBox, itself
+  /// excluded; ascending.
+  std::vector<std::size_t> Near(std::size_t body, double reach_m);
+
   /// The place among the last plan.s groups of a body that is in it.
   std::size_t GroupOf(std::size_t body) const { return group_of_[body]; }
 
@@ -40,10 +47,12 @@ class Islands {
   void KnowJoints();
   void Add(std::size_t body);  // with all that sleep with it
   void AddAlone(std::size_t body);
-  void AddJoined(std::size_t body);
+  void Reach(std::size_t body, std::size_t other, double gap_m);
+  void AskJoined(std::size_t body);
   void Unite(std::size_t a, std::size_t b);
   std::size_t RootOf(std::size_t body);
   void Ask(std::size_t body, double reach_m);
+  std::vector<btRigidBody*> Overlapping(const btRigidBody& rigid, double reach_m);
   double SpeedOf(std::size_t body) const;
 
   BulletBodies& bodies_;
@@ -61,10 +70,9 @@ class Islands {
   std::span<const double> pushed_speed_;
   std::vector<std::uint64_t> plan_of_;  // the last that each was in
   std::vector<std::size_t> parents_;
-  std::vector<double> speeds_;                    // m/s, of roots: the fastest of all
-  std::vector<double> asked_;                     // m/s, with which each was asked
-  std::vector<std::vector<std::size_t>> united_;  // of roots
-  std::vector<std::size_t> members_;              // of the plan
+  std::vector<double> reaches_;       // m, how far each may come, or send others
+  std::vector<double> asked_;         // m, the reach with which it was asked; -1 = not yet
+  std::vector<std::size_t> members_;  // of the plan
   std::vector<std::size_t> to_ask_;
   std::vector<ContactPair*> planned_;
   std::vector<std::size_t> numbers_;  // of roots: that of the group

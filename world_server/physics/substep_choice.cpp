@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kShortest = 1e-4;         // s: bounds what a scene can cost
 constexpr double kLongestTouching = 5e-3;  // s
+constexpr double kResting = 0.01;          // m/s: slower, and any substep will do
 constexpr double kMostTurn = 0.1;          // rad in a substep of free flight
 // ... while something is touched: the direction of slip is one and the same for a substep, and lags
 // half of what the body turns in it.
@@ -23,6 +24,19 @@ constexpr double kHighStack = 10;  // bodies
 
 double PerSecond(double rate, double most) {
   return rate > 0 ? most / rate : std::numeric_limits<double>::infinity();
+}
+
+// By our own routines (bullet_contacts.h), and of anything round on a half-space.
+bool IsFoundAhead(const ContactPair& pair) {
+  const int first = pair.first->getCollisionShape()->getShapeType();
+  const int second = pair.second->getCollisionShape()->getShapeType();
+  if (first == STATIC_PLANE_PROXYTYPE || second == STATIC_PLANE_PROXYTYPE) return true;
+  const auto has_faces = [](int shape) {
+    return shape == BOX_SHAPE_PROXYTYPE || shape == CYLINDER_SHAPE_PROXYTYPE ||
+           shape == CONVEX_HULL_SHAPE_PROXYTYPE;
+  };
+  return (first == BOX_SHAPE_PROXYTYPE && has_faces(second)) ||
+         (second == BOX_SHAPE_PROXYTYPE && has_faces(first));
 }
 
 // Ten boxes of size L stand at 0.03 sqrt(L/g), 2 ms for 5 cm.
@@ -42,6 +56,8 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
     ++motion.awake;
     const double speed = body.rigid->getLinearVelocity().length();
     motion.turning = std::max(motion.turning, double{body.rigid->getAngularVelocity().length()});
+    motion.speed = std::max(motion.speed,
+                            speed + body.outer_radius * body.rigid->getAngularVelocity().length());
     if (body.inner_radius > 0) {
       motion.crossing = std::max(motion.crossing, speed / body.inner_radius);
     }
@@ -65,6 +81,7 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
   for (const ContactPair* pair : group.pairs) {
     join(*pair->first, *pair->second);
     const auto [first, second] = pair->Order();
+    motion.meets_late = motion.meets_late || !IsFoundAhead(*pair);
     motion.rebounds =
         motion.rebounds || bodies.restitutions[static_cast<std::size_t>(first)] *
                                    bodies.restitutions[static_cast<std::size_t>(second)] >
@@ -80,6 +97,10 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
   return motion;
 }
 
+int Sweeps(const GroupMotion& motion) {
+  return static_cast<int>(std::clamp(20 * std::sqrt(motion.mass_ratio), 50.0, 400.0));
+}
+
 double PushedSubstep(const GroupMotion& motion, double substep_s) {
   return std::min(substep_s, StackSubstep(motion));
 }
@@ -88,10 +109,11 @@ double CoarseSubstep(const GroupMotion& motion, double substep_s, double window_
   const double pushed = PushedSubstep(motion, substep_s);
   double coarse = std::min(
       {window_s, PerSecond(motion.turning, kMostTurn), PerSecond(motion.drag, kMostDragging)});
-  if (motion.rebounds) return pushed;
+  if (motion.rebounds || motion.meets_late) return pushed;
   if (motion.meets) {
     const double height = std::min(static_cast<double>(motion.awake), kHighStack) / kHighStack;
-    coarse = std::min({coarse, kLongestTouching, PerSecond(motion.turning, kMostTouchingTurn),
+    const double touching = motion.speed < kResting ? window_s : kLongestTouching;
+    coarse = std::min({coarse, touching, PerSecond(motion.turning, kMostTouchingTurn),
                        PerSecond(motion.crossing, 0.5), StackSubstep(motion) / (1 + height)});
   }
   return std::max(coarse, pushed);

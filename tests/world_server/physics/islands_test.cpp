@@ -81,7 +81,10 @@ TEST_CASE("bodies of different groups that come to meet each other within a peri
       CAPTURE(speed, apart);
       CHECK(world.State(1).pose.position.x() - world.State(0).pose.position.x() > 0.0299);
       CHECK(Momentum(scene, world).x() == Approx(0.05 * speed).epsilon(1e-9));
-      CHECK(world.State(0).velocity.x() == Approx(0.25 * speed).epsilon(1e-3));
+      // They part no faster than a penetration is taken back: 0.2 of 0.1 mm in a substep of 1 ms.
+      const double parting = world.State(1).velocity.x() - world.State(0).velocity.x();
+      CHECK(parting > -1e-6 * speed);
+      CHECK(parting < 0.02 + 1e-6);
     }
   }
 }

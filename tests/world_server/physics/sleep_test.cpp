@@ -74,8 +74,6 @@ TEST_CASE("a push wakes those that it reaches and no others") {
   CHECK(world.awake() == 2);
   CHECK(world.State(1).pose.position.x() > 1e-4);
   CHECK(SamePlace(world.State(3), far));
-  // The box at the far end was not stepped once.
-  CHECK(world.substeps() > 0);
 }
 
 TEST_CASE("a sleeper that is hit wakes before it is entered, and takes its share of the momentum") {

@@ -23,7 +23,9 @@ TEST_CASE("free flight takes the window, turning and braking bodies less") {
 }
 
 TEST_CASE("in contact a lone body bears 5 ms, a fast, a bouncing or a spinning one less") {
-  const GroupMotion lone{.awake = 1, .meets = true, .gravity = 9.81};
+  GroupMotion lone{.awake = 1, .meets = true, .gravity = 9.81};
+  CHECK(CoarseSubstep(lone, kSubstep, kWindow) == kWindow);  // at rest
+  lone.speed = 0.1;
   CHECK(CoarseSubstep(lone, kSubstep, kWindow) == 5e-3);
   GroupMotion fast = lone;
   fast.crossing = 250;  // crosses its inner radius in 4 ms
@@ -34,6 +36,16 @@ TEST_CASE("in contact a lone body bears 5 ms, a fast, a bouncing or a spinning o
   GroupMotion bouncing = lone;
   bouncing.rebounds = true;
   CHECK(CoarseSubstep(bouncing, kSubstep, kWindow) == kSubstep);
+}
+
+TEST_CASE("what meets late, or unequal, is stepped finely and swept more often") {
+  GroupMotion late{.awake = 1, .meets = true, .meets_late = true};
+  CHECK(CoarseSubstep(late, kSubstep, kWindow) == kSubstep);
+  CHECK(Sweeps(late) == 50);
+  late.mass_ratio = 100;
+  CHECK(Sweeps(late) == 200);
+  late.mass_ratio = 1e12;
+  CHECK(Sweeps(late) == 400);
 }
 
 TEST_CASE("stacks: 2 ms for 5 cm, as the root of the size, and shorter for ill-matched masses") {
