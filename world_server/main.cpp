@@ -11,7 +11,7 @@
 #include "common/logging.h"
 #include "common/version.h"
 #include "world_server/loop.h"
-#include "world_server/physics/bullet_world.h"
+#include "world_server/physics/deformable_world.h"
 #include "world_server/scene/needs.h"
 #include "world_server/scene/scene_message.h"
 #include "world_server/scene/sdf_loader.h"
@@ -34,7 +34,7 @@ ReadyScene Load(const Settings& settings) {
   ready.loaded = LoadSdf(settings.scene.file);
   for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
   ready.dynamics =
-      std::make_unique<BulletWorld>(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
+      MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
   return ready;
 }
 

@@ -47,7 +47,7 @@ void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWor
   }
   scene = new_scene;
   dynamics = std::move(new_dynamics);
-  plane_finder = std::make_unique<PlaneFinder>(scene);
+  plane_finder = std::make_unique<PlaneFinder>(scene, dynamics.get());
   for (std::uint32_t& generation : generations) ++generation;
   generations.resize(std::max(generations.size(), scene.bodies.size()), 1);
 
@@ -88,7 +88,8 @@ void WorldStep::State::Penalise(double period_s) {
     kicks = PenaltyKicks(scene, states, fingers,
                          {.stiffness_n_per_m = stiffness_n_per_m,
                           .period_s = period_s,
-                          .largest_impulse_ns = settings.coupling.force_cap_n * gap_s});
+                          .largest_impulse_ns = settings.coupling.force_cap_n * gap_s},
+                         dynamics.get());
   }
   Vec3 penalty = ToVec3(health.penalty_impulse);
   for (const Kick& kick : kicks) penalty += kick.impulse;

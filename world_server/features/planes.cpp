@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "common/body_step.h"
+#include "world_server/physics/soft_surface.h"
 
 namespace rikiseki::world {
 namespace {
@@ -24,6 +25,15 @@ double Mobility(const SceneBody& body, const BodyState& state, const Vec3& point
                               direction);
 }
 
+// The finger's own spring and the body's in series.
+void Soften(const SoftSurface& soft, const NearestPoint& nearest, const Finger& finger,
+            protocol::Plane& plane) {
+  const SoftSurface::Yield yield = soft.YieldAt(nearest.point, nearest.normal);
+  const double own = plane.stiffness > 0 ? plane.stiffness : finger.stiffness_n_per_m;
+  plane.stiffness = SoftSurface::InSeries(own, yield);
+  plane.inverse_mass = yield.inverse_mass;
+}
+
 struct Candidate {
   double gap = 0;  // m, from the finger sphere's surface
   protocol::Plane plane;
@@ -41,7 +51,8 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
                         .radius_m = pointer.radius,
                         .position = ToVec3(pointer.position),
                         .velocity = ToVec3(pointer.velocity),
-                        .friction = friction};
+                        .friction = friction,
+                        .stiffness_n_per_m = tick.stiffness};
     const bool sound = finger.pointer < protocol::kMaxPointers && finger.radius_m >= 0 &&
                        finger.radius_m <= kLargestFinger && Usable(finger.position) &&
                        Usable(finger.velocity);
@@ -69,15 +80,18 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
     for (const std::size_t body : bodies) {
       const SceneBody& scene_body = scene_.bodies[body];
       const BodyState& state = states[body];
+      const SoftSurface* soft = dynamics_ != nullptr ? dynamics_->FindSoft(body) : nullptr;
       const double body_way = scene_body.fixed ? 0 : near_.WayOf(body, state, time_s);
       for (std::size_t place = 0; place < scene_body.colliders.size(); ++place) {
         const Collider& collider = scene_body.colliders[place];
-        const Pose pose_WS = state.pose * collider.pose_BS;
+        const Pose pose_WS = soft != nullptr ? state.pose : state.pose * collider.pose_BS;
+        const Shape& shape = soft != nullptr ? soft->unloaded() : collider.shape;
+        Vec3 finger_S = pose_WS.Inverse() * finger.position;
+        if (soft != nullptr) finger_S = soft->WithoutDisplacement(finger_S);
         const TrackKey key = {finger.pointer, body, place};
         const auto known = tracks_.find(key);
         FeatureTrack track = known == tracks_.end() ? FeatureTrack() : std::move(known->second);
-        track.Find(collider.shape, pose_WS.Inverse() * finger.position, finger_reach + body_way,
-                   features);
+        track.Find(shape, finger_S, finger_reach + body_way, features);
         if (features.empty()) continue;
         const auto slots = track.Number(features, finger_reach + body_way);
         for (std::size_t i = 0; i < features.size(); ++i) {
@@ -101,7 +115,9 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
                          .inverse_mass = Mobility(scene_body, state, point, normal)};
-          if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
+          if (soft != nullptr) {
+            Soften(*soft, features[i], finger, found.plane);
+          } else if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
             found.plane.radius = ball->radius;
           }
           if (finger.friction > 0 && collider.friction > 0) {

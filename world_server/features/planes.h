@@ -1,6 +1,6 @@
 // The planes that the haptic side renders: for every finger and every shape near it the tangent
 // plane at the shape's nearest point - of a mesh at each near point - normal towards the finger.
-// Paper 3.1.
+// Paper 3.1. Of a soft body the plane that the finger does not move (soft_surface.h).
 #pragma once
 
 #include <array>
@@ -31,6 +31,7 @@ struct Finger {
   Vec3 position = Vec3::Zero();  // of the sphere's centre, in W
   Vec3 velocity = Vec3::Zero();  // m/s
   double friction = 0;           // Coulomb, dynamic; 0 = none
+  double stiffness_n_per_m = 0;  // that it renders surfaces with which bring none of their own
 };
 
 inline constexpr double kLargestFinger = 1.0;  // m
@@ -49,8 +50,9 @@ static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1
 /// Finds the planes of one scene, frame after frame.
 class PlaneFinder {
  public:
-  /// `scene` outlives this.
-  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+  /// `scene` outlives this, and so do the dynamics, which know the surfaces of its soft bodies.
+  explicit PlaneFinder(const Scene& scene, const DynamicsWorld* dynamics = nullptr)
+      : scene_(scene), dynamics_(dynamics), near_(scene) {}
 
   /// Fills `planes` nearest first, at most its length, and returns how many. Friction of finger and
   /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise.
@@ -63,6 +65,7 @@ class PlaneFinder {
   using TrackKey = std::array<std::size_t, 3>;  // pointer, body, collider
 
   const Scene& scene_;
+  const DynamicsWorld* dynamics_;
   NearBodies near_;
   std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
 };

@@ -25,9 +25,10 @@ constexpr std::array<std::pair<SceneNeed, const char*>, 8> kWords = {{
 
 SceneNeeds WorkOutNeeds(const Scene& scene) {
   std::size_t moving = 0;
-  bool drag = false;
+  bool drag = false, deforms = false;
   for (const SceneBody& body : scene.bodies) {
-    if (body.fixed) continue;
+    deforms = deforms || body.softness;
+    if (body.fixed || body.softness) continue;
     ++moving;
     drag = drag || body.drag_ns_per_m > 0 || body.angular_drag_nms > 0;
   }
@@ -38,7 +39,7 @@ SceneNeeds WorkOutNeeds(const Scene& scene) {
   sort(moving > 0, protocol::kNeedMovingBodies);
   sort(moving > 1, protocol::kNeedBodyContacts);
   sort(drag, protocol::kNeedDrag);
-  sort(false, protocol::kNeedDeformation);
+  sort(deforms, protocol::kNeedDeformation);
   // Without an engine there is none of this; with one, all of it.
   if (moving == 0) {
     sort(false, protocol::kNeedRotation | protocol::kNeedFastBodies | protocol::kNeedLocalBodies);

@@ -60,6 +60,14 @@ struct Collider {
   double recovery_s = 0;  // its force takes this long to come and go; 0 = the haptic side's own
 };
 
+/// What a body that deforms is made of; its mass is spread evenly over its one collider.
+struct Softness {
+  double youngs_modulus_pa = 0;
+  double poisson_ratio = 0.3;
+  double relaxation_s = 0.02;  // damping: stress = C (strain + relaxation strain rate)
+  double element_m = 0;        // edge of the tetrahedra, roughly
+};
+
 struct SceneBody {
   std::string name;  // "model::link"
   bool fixed = false;
@@ -71,6 +79,7 @@ struct SceneBody {
   double angular_drag_nms = 0;  // N m s/rad
   Vec3 wind = Vec3::Zero();     // m/s, of the air round this body
   std::vector<Collider> colliders = {};
+  std::optional<Softness> softness = {};  // none: rigid
 };
 
 struct Scene {

@@ -250,6 +250,21 @@ class Loader {
     }
   }
 
+  /// When all bodies are known.
+  void CheckSoftLinks() {
+    const Scene& scene = loaded_.scene;
+    const auto rigid = std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const auto& body) {
+      return !body.fixed && !body.softness;
+    });
+    for (const auto& [place, link] : soft_links_) {
+      RequireHeld(link, scene, scene.bodies[place]);
+      if (rigid == scene.bodies.end()) continue;
+      loaded_.warnings.push_back(PlaceOfSoftness(link) + ": soft link " +
+                                 scene.bodies[place].name + " and rigid links that move, as " +
+                                 rigid->name + ", pass through each other");
+    }
+  }
+
  private:
   Shape ReadShape(const sdf::Collision& collision, bool is_static) {
     const sdf::Mesh* mesh = collision.Geom()->MeshShape();
@@ -288,6 +303,8 @@ class Loader {
       if (!is_static && i > 0) RequireSameSurface(collision, body, collider);
       body.colliders.push_back(collider);
     }
+    ReadSoftness(link.Element(), body);
+    if (body.softness) soft_links_.emplace_back(loaded_.scene.bodies.size(), link.Element());
     if (loaded_.scene.bodies.size() == protocol::kMaxBodies) {
       Refuse(link.Element(), "more than " + std::to_string(protocol::kMaxBodies) + " bodies");
     }
@@ -297,6 +314,7 @@ class Loader {
   LoadedScene& loaded_;
   SdfMeshes meshes_;
   Vec3 wind_;  // m/s
+  std::vector<std::pair<std::size_t, sdf::ElementPtr>> soft_links_;  // by place in the scene
 };
 
 }  // namespace
@@ -339,6 +357,7 @@ LoadedScene LoadSdf(const std::string& path) {
   for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
     loader.ReadModel(*world.ModelByIndex(i), "", Pose{}, /*in_static=*/false);
   }
+  loader.CheckSoftLinks();
   if (loaded.scene.bodies.empty()) {
     Refuse(world.Element(),
            "world " + world.Name() + " is empty; at least one model with a collision is expected");
