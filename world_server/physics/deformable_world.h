@@ -19,9 +19,9 @@ std::unique_ptr<DynamicsWorld> MakeDynamics(const Scene& scene, double longest_s
 
 class DeformableWorld final : public DynamicsWorld {
  public:
-  /// Soft bodies take steps of this length: half as long changes what is felt by nothing, since a finger
-  /// feels them at rest, and costs twice as much.
-  static constexpr double kStepS = 0.01;
+  /// Soft bodies take steps of this length: shorter ones would change nothing of what is felt, which is
+  /// the body at rest, and cost more.
+  static constexpr double kStepS = 0.0125;
 
   DeformableWorld(const Scene& scene, double longest_substep_s);
   ~DeformableWorld() override;

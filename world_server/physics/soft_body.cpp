@@ -8,7 +8,7 @@
 namespace rikiseki::world {
 namespace {
 
-constexpr double kTolerance = 1e-10;  // of the right side, in the norm of the preconditioner
+constexpr double kTolerance = 1e-8;  // of the right side, in the norm of the preconditioner
 constexpr int kMostIterations = 300;
 constexpr int kMostSettlingSteps = 300;
 constexpr double kSettled = 1e-13;      // of the size, the last settling step
@@ -25,7 +25,7 @@ Mat3 RotationIn(const Mat3& f, const Mat3& before) {
     const double along = std::abs(r.cwiseProduct(f).sum());
     const Vec3 way = turn / (along + 1e-9);
     const double angle = way.norm();
-    if (!(angle > 1e-12)) break;
+    if (!(angle > 1e-8)) break;
     r = Eigen::AngleAxisd(angle, way / angle) * r;
   }
   return Quat(r).normalized().toRotationMatrix();

@@ -12,7 +12,10 @@
 namespace rikiseki::world {
 namespace {
 
-constexpr double kPadEdges = 2;            // radius of a pad, in mean edges of the surface
+// Radius of a pad: of a fingertip's, which presses like a punch of half of it, but not finer than the
+// mesh can tell, in mean edges of the surface.
+constexpr double kPadRadius = 0.02;  // m
+constexpr double kPadEdges = 2;
 constexpr double kLeastCompliance = 1e-9;  // m/N: stiffer is no surface that can be rendered
 
 // Where a line meets a triangle from its outer side: the way along the line, and the corners' weights.
@@ -55,7 +58,8 @@ SoftSurface::SoftSurface(const SoftBody& body) : body_(body), triangles_(Surface
   std::sort(nodes_.begin(), nodes_.end());
   nodes_.erase(std::unique(nodes_.begin(), nodes_.end()), nodes_.end());
   for (const std::uint32_t node : nodes_) normals_.push_back(normals[node].stableNormalized());
-  pad_radius_ = kPadEdges * edges / (3 * static_cast<double>(triangles_.size()));
+  pad_radius_ =
+      std::max(kPadRadius, kPadEdges * edges / (3 * static_cast<double>(triangles_.size())));
 
   std::vector<Vec3> corners;
   for (Eigen::Index i = 0; i < at.cols(); ++i) corners.emplace_back(at.col(i));
