@@ -40,12 +40,13 @@ Overlap SoftOverlap(const SoftSurface& soft, const Collider& collider, const Pos
   const NearestPoint nearest =
       FindNearestPoint(soft.unloaded(), soft.WithoutDisplacement(finger_B));
   const double depth = finger.radius_m - nearest.normal.dot(finger_B - nearest.point);
-  if (!(depth > 0)) return {};
   const double own = collider.stiffness_n_per_m.value_or(common_stiffness);
+  if (!(depth > 0) || !(own > 0)) return {};
+  const SoftSurface::Spring felt = SoftSurface::InSeries(
+      {.stiffness_n_per_m = own}, soft.YieldAt(nearest.point, nearest.normal));
   return {.depth = depth,
           .normal = pose_WB.orientation * nearest.normal,
-          .stiffness_n_per_m =
-              own > 0 ? SoftSurface::InSeries(own, soft.YieldAt(nearest.point, nearest.normal)) : 0};
+          .stiffness_n_per_m = felt.stiffness_n_per_m};
 }
 
 }  // namespace

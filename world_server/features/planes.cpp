@@ -25,12 +25,17 @@ double Mobility(const SceneBody& body, const BodyState& state, const Vec3& point
                               direction);
 }
 
-// The finger's own spring and the body's in series.
+// The finger's spring and damper, or those that the surface brings, before a body that yields.
 void Soften(const SoftSurface& soft, const NearestPoint& nearest, const Finger& finger,
             protocol::Plane& plane) {
   const SoftSurface::Yield yield = soft.YieldAt(nearest.point, nearest.normal);
-  const double own = plane.stiffness > 0 ? plane.stiffness : finger.stiffness_n_per_m;
-  plane.stiffness = SoftSurface::InSeries(own, yield);
+  const bool brings = plane.stiffness > 0;
+  const SoftSurface::Spring felt = SoftSurface::InSeries(
+      {.stiffness_n_per_m = brings ? plane.stiffness : finger.stiffness_n_per_m,
+       .damping_ns_per_m = brings ? plane.damping : finger.damping_ns_per_m},
+      yield);
+  plane.stiffness = felt.stiffness_n_per_m;
+  plane.damping = felt.damping_ns_per_m;
   plane.inverse_mass = yield.inverse_mass;
 }
 
@@ -52,7 +57,8 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
                         .position = ToVec3(pointer.position),
                         .velocity = ToVec3(pointer.velocity),
                         .friction = friction,
-                        .stiffness_n_per_m = tick.stiffness};
+                        .stiffness_n_per_m = tick.stiffness,
+                        .damping_ns_per_m = tick.damping};
     const bool sound = finger.pointer < protocol::kMaxPointers && finger.radius_m >= 0 &&
                        finger.radius_m <= kLargestFinger && Usable(finger.position) &&
                        Usable(finger.velocity);

@@ -31,7 +31,8 @@ struct Finger {
   Vec3 position = Vec3::Zero();  // of the sphere's centre, in W
   Vec3 velocity = Vec3::Zero();  // m/s
   double friction = 0;           // Coulomb, dynamic; 0 = none
-  double stiffness_n_per_m = 0;  // that it renders surfaces with which bring none of their own
+  double stiffness_n_per_m = 0;  // that it renders surfaces with which bring none of their own,
+  double damping_ns_per_m = 0;   // and the damping
 };
 
 inline constexpr double kLargestFinger = 1.0;  // m

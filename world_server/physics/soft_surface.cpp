@@ -131,7 +131,8 @@ SoftSurface::Yield SoftSurface::YieldAt(const Vec3& point, const Vec3& normal) c
   SoftBody::NodeVectors force = SoftBody::NodeVectors::Zero(3, at.cols());
   Share(PadAt(point, normal), at, normal, point.cross(normal), force);
   const SoftBody::NodeVectors way = body_.Displacements(force);
-  Yield yield{.compliance_m_per_n = force.cwiseProduct(way).sum()};
+  Yield yield{.compliance_m_per_n = force.cwiseProduct(way).sum(),
+              .relaxation_s = body_.relaxation_s()};
   for (const std::uint32_t node : nodes_) {
     if (body_.is_held(node)) continue;
     yield.inverse_mass += force.col(node).squaredNorm() / body_.masses()[node];
@@ -139,9 +140,16 @@ SoftSurface::Yield SoftSurface::YieldAt(const Vec3& point, const Vec3& normal) c
   return yield;
 }
 
-double SoftSurface::InSeries(double stiffness_n_per_m, const Yield& yield) {
-  const double spring = stiffness_n_per_m > 0 ? 1 / stiffness_n_per_m : 0;
-  return 1 / std::max(spring + yield.compliance_m_per_n, kLeastCompliance);
+// A slow push at speed v moves the own spring by a = stiffness/own of it and the body by the rest:
+// damping force = (d_own a^2 + relaxation/c (1-a)^2) v.
+SoftSurface::Spring SoftSurface::InSeries(const Spring& own, const Yield& yield) {
+  const double spring = own.stiffness_n_per_m > 0 ? 1 / own.stiffness_n_per_m : 0;
+  const double compliance = std::max(yield.compliance_m_per_n, kLeastCompliance);
+  const double stiffness = 1 / (spring + compliance);
+  const double damping =
+      stiffness * stiffness *
+      (own.damping_ns_per_m * spring * spring + yield.relaxation_s * compliance);
+  return {stiffness, std::min(damping, own.damping_ns_per_m)};
 }
 
 void SoftSurface::Spread(const Vec3& impulse, const Vec3& angular_impulse,

@@ -32,12 +32,19 @@ class SoftSurface {
   /// How the unloaded surface yields to a push along `normal` at `point` of it.
   struct Yield {
     double compliance_m_per_n = 0;  // when it has come to rest
+    double relaxation_s = 0;        // of its material
     double inverse_mass = 0;        // 1/kg, at once
   };
   Yield YieldAt(const Vec3& point, const Vec3& normal) const;
 
-  /// N/m, of a surface spring before a body that yields; a spring of 0 or less is none: rigid.
-  static double InSeries(double stiffness_n_per_m, const Yield& yield);
+  /// What a finger feels of its own spring and damper before a body that yields: the springs in series,
+  /// and of the damping, the material's with it, what a slow push meets; but no more than its own, which
+  /// is what its loop is known to bear. A spring of 0 is none: rigid.
+  struct Spring {
+    double stiffness_n_per_m = 0;
+    double damping_ns_per_m = 0;
+  };
+  static Spring InSeries(const Spring& own, const Yield& yield);
 
   /// Adds to `impulses` what each node takes of a push by its line of action: those of the pad under
   /// the point where the line meets the deformed surface from outside - all of the surface, where it

@@ -102,8 +102,21 @@ TEST_CASE("the compliance is that of the surface under the pad, and smooth under
   // A rigid punch as wide as the pad on a half-space gives (1 - nu^2) / (2 a E), a = 10..20 mm.
   CHECK(least > 0.91 / (2 * 0.02 * 1e4));
   CHECK(most < 0.91 / (2 * 0.01 * 1e4));
-  CHECK(SoftSurface::InSeries(2000, {.compliance_m_per_n = 0.002}) == Approx(400));
-  CHECK(SoftSurface::InSeries(0, {.compliance_m_per_n = 0.002}) == Approx(500));
+}
+
+TEST_CASE("two springs in series, and a damper that is never more than the finger's own") {
+  // 2000 N/m before 500 N/m are 400; a fifth of a slow push goes into the first.
+  const SoftSurface::Yield bare{.compliance_m_per_n = 0.002};
+  const auto felt = SoftSurface::InSeries({2000, 2}, bare);
+  CHECK(felt.stiffness_n_per_m == Approx(400));
+  CHECK(felt.damping_ns_per_m == Approx(2 * 0.2 * 0.2));
+  // 1 ms of 500 N/m are a damper of 0.5 N s/m, and four fifths of the push go into it.
+  const SoftSurface::Yield slack{.compliance_m_per_n = 0.002, .relaxation_s = 1e-3};
+  CHECK(SoftSurface::InSeries({2000, 2}, slack).damping_ns_per_m ==
+        Approx(2 * 0.2 * 0.2 + 0.5 * 0.8 * 0.8));
+  const SoftSurface::Yield pitch{.compliance_m_per_n = 0.002, .relaxation_s = 10};
+  CHECK(SoftSurface::InSeries({2000, 2}, pitch).damping_ns_per_m == 2);
+  CHECK(SoftSurface::InSeries({0, 2}, bare).stiffness_n_per_m == Approx(500));
 }
 
 TEST_CASE("a steady push moves the surface by compliance times force, and the finger is told back") {
