@@ -33,8 +33,7 @@ ReadyScene Load(const Settings& settings) {
   ReadyScene ready;
   ready.loaded = LoadSdf(settings.scene.file);
   for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
-  ready.dynamics =
-      MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
+  ready.dynamics = MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
   return ready;
 }
 

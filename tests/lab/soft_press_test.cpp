@@ -2,6 +2,7 @@
 // springs in series, at any world rate, latency and coupling, and nothing buzzes.
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <numbers>
 
@@ -90,8 +91,7 @@ TEST_CASE("a static press gives the force of the two springs in series") {
         const Loops loops{.rate_hz = rate_hz, .latency_periods = latency};
         CAPTURE(e, rate_hz, latency);
         const Settings settings = SettingsOf(loops);
-        const double series =
-            Series(scene, 0.003, 0.004, settings.haptic.render.stiffness_n_per_m);
+        const double series = Series(scene, 0.003, 0.004, settings.haptic.render.stiffness_n_per_m);
         const double depth = std::min(0.008, 4 / series);
         const std::int64_t start_ns = CoupledRun::StartNs(settings.haptic);
         PrescribedDevice finger(
@@ -121,10 +121,14 @@ TEST_CASE("a static press gives the force of the two springs in series") {
 
 TEST_CASE("a hand presses, pokes and strokes it, and nothing buzzes") {
   const world::Scene scene = SoftBlock(8e3);
+  const bool full = std::getenv("RIKISEKI_FULL") != nullptr;
+  double first_most = 0;
   for (const auto coupling :
        {protocol::Coupling::kLocal, protocol::Coupling::kImpulse, protocol::Coupling::kPosition}) {
     for (const double rate_hz : {10.0, 20.0, 60.0}) {
       for (const double latency : {0.0, 1.0, 2.0}) {
+        const bool hard = latency == 2.0 && rate_hz < 60;
+        if (!full && !hard && (coupling != protocol::Coupling::kLocal || latency == 1)) continue;
         CAPTURE(static_cast<int>(coupling), rate_hz, latency);
         const Loops loops{rate_hz, latency, coupling};
         const Settings settings = SettingsOf(loops);
@@ -156,7 +160,10 @@ TEST_CASE("a hand presses, pokes and strokes it, and nothing buzzes") {
           squares += force * force;
         }
         const double mean = sum / resting;
-        CHECK(most < 6);  // 135 N/m of the hand and what its mass brings along
+        // The hardest poke is the same at any rate and latency: nothing of it comes back late. What is
+        // left is where the pad is, within the dent.
+        if (first_most == 0) first_most = most;
+        CHECK(most == Approx(first_most).epsilon(0.01));
         CHECK(mean > 1);
         // The hand's own oscillation, 3.5 Hz and damped by 5.8 /s and the surface, is gone by then.
         CHECK(std::sqrt(std::max(0.0, squares / resting - mean * mean)) < 0.01 * mean);
@@ -172,7 +179,9 @@ TEST_CASE("a finger that slides over the top and off its edge feels no step") {
   for (const double rate_hz : {10.0, 20.0, 60.0}) {
     CAPTURE(rate_hz);
     const Loops loops{.rate_hz = rate_hz, .latency_periods = 0.5};
-    const Settings settings = SettingsOf(loops);
+    Settings settings = SettingsOf(loops);
+    settings.haptic.render.damping_ns_per_m =
+        0;  // it would show how planes turn, not whether they jump
     PrescribedDevice finger(
         [&](double t_s) {
           const double down = haptic::MinimumJerk((t_s - 0.3) / 0.2);
@@ -192,7 +201,12 @@ TEST_CASE("a finger that slides over the top and off its edge feels no step") {
       }
       last = force;
     }
-    WARN("step " << largest_step << " middle " << least << " " << most);
+    // Nothing jumps: a tick changes the force by no more than what a plane that turns over an edge of
+    // the block within a world period does to 2 N. (With stiffness in steps it would be 0.1 N.)
+    CHECK(largest_step < 0.04);
+    // In the middle the force is even, but for the edges, which give way more and are not far.
+    CHECK(most < 2.2);
+    CHECK(least > 1.6);
     CHECK(last == 0);
     CHECK(run->haptic_health().energy.flagged == 0);
   }

@@ -77,11 +77,10 @@ std::vector<Kick> PenaltyKicks(const Scene& scene, std::span<const BodyState> st
       if (scene.bodies[body].fixed) continue;
       const Pose& pose_WB = states[body].pose;
       const SoftSurface* soft = dynamics != nullptr ? dynamics->FindSoft(body) : nullptr;
-      const Overlap overlap =
-          soft != nullptr
-              ? SoftOverlap(*soft, scene.bodies[body].colliders[0], pose_WB, finger,
-                            law.stiffness_n_per_m)
-              : DeepestOverlap(scene.bodies[body], pose_WB, finger, law.stiffness_n_per_m);
+      const Overlap overlap = soft != nullptr ? SoftOverlap(*soft, scene.bodies[body].colliders[0],
+                                                            pose_WB, finger, law.stiffness_n_per_m)
+                                              : DeepestOverlap(scene.bodies[body], pose_WB, finger,
+                                                               law.stiffness_n_per_m);
       if (!(overlap.depth > 0) || !(overlap.stiffness_n_per_m > 0)) continue;
       const double stiffness = std::min(overlap.stiffness_n_per_m, kLargestStiffness);
       const double impulse =

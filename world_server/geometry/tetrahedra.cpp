@@ -119,7 +119,8 @@ TetrahedralMesh MeshEllipsoid(const Vec3& radii, double edge_m) {
       const Vec3 outer = inner.normalized();
       for (std::uint32_t layer = 1; layer <= layers; ++layer) {
         const double share = static_cast<double>(layer) / layers;
-        mesh.nodes.emplace_back(layer == layers ? outer : Vec3((1 - share) * inner + share * outer));
+        mesh.nodes.emplace_back(layer == layers ? outer
+                                                : Vec3((1 - share) * inner + share * outer));
       }
     }
     for (std::uint32_t layer = 0; layer < layers; ++layer) {

@@ -9,7 +9,8 @@ struct TriangleFoot {
   enum class Part { kFace, kEdge, kCorner };
 
   Vec3 point = Vec3::Zero();
-  Vec3 weights = Vec3::UnitX();  // of the corners: point = sum of weight times corner; sum 1, each >= 0
+  Vec3 weights =
+      Vec3::UnitX();  // of the corners: point = sum of weight times corner; sum 1, each >= 0
   Part part = Part::kFace;
   int index = 0;  // of the edge (from corner i to i+1) or the corner
 };

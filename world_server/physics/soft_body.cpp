@@ -21,7 +21,8 @@ constexpr double kRestingWay = 1e-6;    // m
 Mat3 RotationIn(const Mat3& f, const Mat3& before) {
   Mat3 r = before;
   for (int i = 0; i < 60; ++i) {
-    const Vec3 turn = r.col(0).cross(f.col(0)) + r.col(1).cross(f.col(1)) + r.col(2).cross(f.col(2));
+    const Vec3 turn =
+        r.col(0).cross(f.col(0)) + r.col(1).cross(f.col(1)) + r.col(2).cross(f.col(2));
     const double along = std::abs(r.cwiseProduct(f).sum());
     const Vec3 way = turn / (along + 1e-9);
     const double angle = way.norm();
@@ -43,7 +44,8 @@ SoftBody::SoftBody(TetrahedralMesh mesh, const SoftMaterial& material, double ma
   const bool sound = e > 0 && std::isfinite(e) && nu >= 0 && nu < 0.5 && relaxation_s_ >= 0 &&
                      std::isfinite(relaxation_s_) && mass_kg > 0 && std::isfinite(mass_kg);
   if (!sound || held_.size() != mesh_.nodes.size() || !gravity.allFinite()) {
-    throw std::invalid_argument("a soft body needs a mass, a modulus and a Poisson ratio below 0.5");
+    throw std::invalid_argument(
+        "a soft body needs a mass, a modulus and a Poisson ratio below 0.5");
   }
   mu_ = e / (2 * (1 + nu));
   lambda_ = e * nu / ((1 + nu) * (1 - 2 * nu));
@@ -56,8 +58,7 @@ SoftBody::SoftBody(TetrahedralMesh mesh, const SoftMaterial& material, double ma
   statics_ = std::make_unique<Factors>(stiffness_);
   // Held at a point or along a line it could still turn: a pivot is then nothing but rounding.
   const Eigen::VectorXd pivots = statics_->vectorD();
-  if (statics_->info() != Eigen::Success ||
-      !(pivots.minCoeff() > 1e-12 * pivots.maxCoeff())) {
+  if (statics_->info() != Eigen::Success || !(pivots.minCoeff() > 1e-12 * pivots.maxCoeff())) {
     throw std::invalid_argument("a soft body must be held at three points that lie on no line");
   }
   Settle();

@@ -52,10 +52,10 @@ class SoftBody {
   NodeVectors Displacements(const NodeVectors& forces) const;
 
   const TetrahedralMesh& mesh() const { return mesh_; }
-  const NodeVectors& positions() const { return positions_; }   // m
+  const NodeVectors& positions() const { return positions_; }    // m
   const NodeVectors& velocities() const { return velocities_; }  // m/s
-  const NodeVectors& unloaded() const { return unloaded_; }     // m, where it settles unpushed
-  const Eigen::VectorXd& masses() const { return masses_; }     // kg
+  const NodeVectors& unloaded() const { return unloaded_; }      // m, where it settles unpushed
+  const Eigen::VectorXd& masses() const { return masses_; }      // kg
   double relaxation_s() const { return relaxation_s_; }
   bool is_held() const { return statics_ != nullptr; }
   bool is_held(std::size_t node) const { return held_[node] != 0; }

@@ -91,7 +91,8 @@ SoftSurface::Pad SoftSurface::PadAt(const Vec3& point, const Vec3& normal) const
   double total = 0;
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
     const double square = (at.col(nodes_[i]) - point).squaredNorm();
-    const double facing = normals_[i].dot(normal);  // not what lies on the other side of something thin
+    const double facing =
+        normals_[i].dot(normal);  // not what lies on the other side of something thin
     if (!(square < pad_radius_ * pad_radius_) || !(facing > 0)) continue;
     const double inside = facing * (1 - square / (pad_radius_ * pad_radius_));
     pad.nodes.push_back(nodes_[i]);
@@ -146,9 +147,8 @@ SoftSurface::Spring SoftSurface::InSeries(const Spring& own, const Yield& yield)
   const double spring = own.stiffness_n_per_m > 0 ? 1 / own.stiffness_n_per_m : 0;
   const double compliance = std::max(yield.compliance_m_per_n, kLeastCompliance);
   const double stiffness = 1 / (spring + compliance);
-  const double damping =
-      stiffness * stiffness *
-      (own.damping_ns_per_m * spring * spring + yield.relaxation_s * compliance);
+  const double damping = stiffness * stiffness *
+                         (own.damping_ns_per_m * spring * spring + yield.relaxation_s * compliance);
   return {stiffness, std::min(damping, own.damping_ns_per_m)};
 }
 

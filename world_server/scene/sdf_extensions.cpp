@@ -167,24 +167,26 @@ void ReadSoftness(const sdf::ElementPtr& link, SceneBody& body) {
   }
   const Shape& shape = body.colliders[0].shape;
   if (SoftNodeCount(shape, 1) == 0) {
-    RefuseExtension(at, "in a link whose collision is no <box>, <sphere> or <ellipsoid>: only these "
-                        "are divided into elements");
+    RefuseExtension(at,
+                    "in a link whose collision is no <box>, <sphere> or <ellipsoid>: only these "
+                    "are divided into elements");
   }
   Softness softness{.youngs_modulus_pa = *modulus};
-  softness.poisson_ratio = ReadNumber(link, kPoissonRatio, 0, kLargestPoissonRatio,
-                                      Range(0, kLargestPoissonRatio))
-                               .value_or(softness.poisson_ratio);
+  softness.poisson_ratio =
+      ReadNumber(link, kPoissonRatio, 0, kLargestPoissonRatio, Range(0, kLargestPoissonRatio))
+          .value_or(softness.poisson_ratio);
   softness.relaxation_s =
       ReadNumber(link, kRelaxation, 0, kLongestRecovery, Range(0, kLongestRecovery) + ", in s,")
           .value_or(softness.relaxation_s);
   const double usual = UsualElement(shape);
-  softness.element_m = ReadNumber(link, kElement, 1e-6, 1e3, "a length above 0, in m,").value_or(usual);
+  softness.element_m =
+      ReadNumber(link, kElement, 1e-6, 1e3, "a length above 0, in m,").value_or(usual);
   const double nodes = SoftNodeCount(shape, softness.element_m);
   if (nodes > kMostSoftNodes) {
-    RefuseExtension(FindChild(link, kElement),
-                    "= " + Number(softness.element_m) + " m makes " + Number(nodes) +
-                        " nodes; at most " + Number(kMostSoftNodes) + " are right, as with " +
-                        Number(usual) + " m");
+    RefuseExtension(FindChild(link, kElement), "= " + Number(softness.element_m) + " m makes " +
+                                                   Number(nodes) + " nodes; at most " +
+                                                   Number(kMostSoftNodes) + " are right, as with " +
+                                                   Number(usual) + " m");
   }
   body.softness = softness;
 }

@@ -253,15 +253,14 @@ class Loader {
   /// When all bodies are known.
   void CheckSoftLinks() {
     const Scene& scene = loaded_.scene;
-    const auto rigid = std::find_if(scene.bodies.begin(), scene.bodies.end(), [](const auto& body) {
-      return !body.fixed && !body.softness;
-    });
+    const auto rigid = std::find_if(scene.bodies.begin(), scene.bodies.end(),
+                                    [](const auto& body) { return !body.fixed && !body.softness; });
     for (const auto& [place, link] : soft_links_) {
       RequireHeld(link, scene, scene.bodies[place]);
       if (rigid == scene.bodies.end()) continue;
-      loaded_.warnings.push_back(PlaceOfSoftness(link) + ": soft link " +
-                                 scene.bodies[place].name + " and rigid links that move, as " +
-                                 rigid->name + ", pass through each other");
+      loaded_.warnings.push_back(PlaceOfSoftness(link) + ": soft link " + scene.bodies[place].name +
+                                 " and rigid links that move, as " + rigid->name +
+                                 ", pass through each other");
     }
   }
 
@@ -313,7 +312,7 @@ class Loader {
 
   LoadedScene& loaded_;
   SdfMeshes meshes_;
-  Vec3 wind_;  // m/s
+  Vec3 wind_;                                                        // m/s
   std::vector<std::pair<std::size_t, sdf::ElementPtr>> soft_links_;  // by place in the scene
 };
 

@@ -11,9 +11,9 @@ namespace rikiseki::world {
 namespace {
 
 constexpr double kUsualNodes = 250;
-constexpr double kTouch = 1e-3;        // of an element: as near is touching
-constexpr double kMostSag = 0.2;       // of the height, where the body's weight strains it most
-constexpr double kOnALine = 1e-6;      // of the extent
+constexpr double kTouch = 1e-3;    // of an element: as near is touching
+constexpr double kMostSag = 0.2;   // of the height, where the body's weight strains it most
+constexpr double kOnALine = 1e-6;  // of the extent
 
 Vec3 RadiiOf(const Shape& shape) {
   if (const auto* ball = std::get_if<Sphere>(&shape)) return Vec3::Constant(ball->radius);
@@ -25,7 +25,8 @@ bool Holds(const Scene& scene, const Vec3& p_W, double touch_m) {
     if (!body.fixed) continue;
     for (const Collider& collider : body.colliders) {
       const Pose pose_WS = body.pose_WB * collider.pose_BS;
-      if (FindNearestPoint(collider.shape, pose_WS.Inverse() * p_W).distance <= touch_m) return true;
+      if (FindNearestPoint(collider.shape, pose_WS.Inverse() * p_W).distance <= touch_m)
+        return true;
     }
   }
   return false;
@@ -93,14 +94,15 @@ std::string WhyNotSoft(const Scene& scene, const SceneBody& body) {
     high = i == 0 ? depth : std::max(high, depth);
   }
   if (!SpanAPlane(held)) {
-    return "nothing holds it: fixed bodies must touch it at three points that lie on no line, and " +
+    return "nothing holds it: fixed bodies must touch it at three points that lie on no line, "
+           "and " +
            std::to_string(held.size()) + " of its nodes touch one";
   }
-  if (held.size() == soft.held.size()) return "it lies within fixed bodies, so that nothing can move";
+  if (held.size() == soft.held.size())
+    return "it lies within fixed bodies, so that nothing can move";
   // A column of this height, on its foot: strain of its lowest layer.
   const double density = body.mass_kg / soft.mesh.Volume();
-  const double needed =
-      body.falls ? density * scene.gravity.norm() * (high - low) / kMostSag : 0.0;
+  const double needed = body.falls ? density * scene.gravity.norm() * (high - low) / kMostSag : 0.0;
   if (body.softness->youngs_modulus_pa < needed) {
     char text[160];
     std::snprintf(text, sizeof text,

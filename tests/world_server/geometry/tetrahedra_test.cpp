@@ -24,7 +24,8 @@ double WorstShape(const TetrahedralMesh& mesh) {
         for (std::size_t k = 0; k < j; ++k) {
           face = std::max(face, (mesh.nodes[t[i]] - mesh.nodes[t[k]])
                                         .cross(mesh.nodes[t[j]] - mesh.nodes[t[k]])
-                                        .norm() / 2);
+                                        .norm() /
+                                    2);
         }
       }
     }

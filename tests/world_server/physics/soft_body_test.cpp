@@ -61,8 +61,7 @@ NodeVectors RandomImpulses(const SoftBody& body, double speed, unsigned seed) {
   NodeVectors impulses(3, body.masses().size());
   for (Eigen::Index i = 0; i < impulses.cols(); ++i) {
     for (int k = 0; k < 3; ++k) {
-      impulses(k, i) =
-          body.masses()[i] * speed * (static_cast<double>(random() % 2001) / 1000 - 1);
+      impulses(k, i) = body.masses()[i] * speed * (static_cast<double>(random() % 2001) / 1000 - 1);
     }
   }
   return impulses;
@@ -82,7 +81,8 @@ TEST_CASE("a bar that is pulled grows by F L / (E A) and thins by Poisson's rati
   const Vec3 half(0.01, 0.015, 0.05);
   const double e = 2e4, nu = 0.35, pressure = 1000;  // 5 % of strain
   const TetrahedralMesh mesh = MeshBox(half, 0.01);
-  SoftBody body = Free(mesh, {.youngs_modulus_pa = e, .poisson_ratio = nu, .relaxation_s = 0.01}, 0.03);
+  SoftBody body =
+      Free(mesh, {.youngs_modulus_pa = e, .poisson_ratio = nu, .relaxation_s = 0.01}, 0.03);
   const auto top = [&](const Vec3& p) { return p.z() > half.z() - 1e-9; };
   const auto bottom = [&](const Vec3& p) { return p.z() < -half.z() + 1e-9; };
   const NodeVectors pull = FaceForces(mesh, pressure * Vec3::UnitZ(), top) -
@@ -94,9 +94,8 @@ TEST_CASE("a bar that is pulled grows by F L / (E A) and thins by Poisson's rati
   // The strain is the same everywhere, which linear elements hold exactly; without turning, so does
   // the law. What is left is the solver's tolerance.
   for (std::size_t i = 0; i < mesh.nodes.size(); ++i) {
-    const Vec3 stretched =
-        mesh.nodes[i].cwiseProduct(Vec3(1 - nu * pressure / e, 1 - nu * pressure / e,
-                                        1 + pressure / e));
+    const Vec3 stretched = mesh.nodes[i].cwiseProduct(
+        Vec3(1 - nu * pressure / e, 1 - nu * pressure / e, 1 + pressure / e));
     REQUIRE((body.positions().col(static_cast<Eigen::Index>(i)) - stretched).norm() < 1e-8);
   }
   // Energy of the strain: half of force times way.
@@ -116,8 +115,7 @@ TEST_CASE("a cantilever sags by F L^3 / (3 E I), the better the finer it is divi
     const SoftBody body(mesh, {.youngs_modulus_pa = e, .poisson_ratio = 0}, 0.064,
                         HeldWhere(mesh, root), Vec3::Zero());
     const double area = 4 * half.y() * half.z();
-    const NodeVectors way =
-        body.Displacements(FaceForces(mesh, force / area * Vec3::UnitZ(), tip));
+    const NodeVectors way = body.Displacements(FaceForces(mesh, force / area * Vec3::UnitZ(), tip));
     const Eigen::Index at_tip =
         std::find_if(mesh.nodes.begin(), mesh.nodes.end(), tip) - mesh.nodes.begin();
     const double inertia = std::pow(2 * half.z(), 4) / 12;
@@ -131,7 +129,8 @@ TEST_CASE("a cantilever sags by F L^3 / (3 E I), the better the finer it is divi
   CHECK(last_error < 0.15);
 }
 
-TEST_CASE("a free body keeps its momentum, and of its spin all but a part that goes with the step") {
+TEST_CASE(
+    "a free body keeps its momentum, and of its spin all but a part that goes with the step") {
   const TetrahedralMesh mesh = MeshBox({0.02, 0.03, 0.04}, 0.02);
   for (const double e : {1e4, 1e7}) {
     double lost_before = 0;
@@ -204,7 +203,8 @@ TEST_CASE("what was turned inside out comes back") {
                     HeldWhere(mesh, foot), Vec3::Zero());
       NodeVectors down = NodeVectors::Zero(3, body.masses().size());
       for (Eigen::Index i = 0; i < down.cols(); ++i) {
-        if (body.positions()(2, i) > 0.03 - 1e-9) down(2, i) = -body.masses()[i] * 60 / step_s * 1e-3;
+        if (body.positions()(2, i) > 0.03 - 1e-9)
+          down(2, i) = -body.masses()[i] * 60 / step_s * 1e-3;
       }
       body.Push(down);
       body.Step(step_s);
@@ -280,9 +280,8 @@ TEST_CASE("what is no soft body is refused") {
   const TetrahedralMesh mesh = MeshBox({0.02, 0.02, 0.03}, 0.01);
   const std::vector<std::uint8_t> free(mesh.nodes.size(), 0);
   const auto make = [&](const SoftMaterial& material, double mass_kg,
-                        const std::vector<std::uint8_t>& held, const Vec3& gravity) {
-    SoftBody(mesh, material, mass_kg, held, gravity);
-  };
+                        const std::vector<std::uint8_t>& held,
+                        const Vec3& gravity) { SoftBody(mesh, material, mass_kg, held, gravity); };
   const SoftMaterial sound{.youngs_modulus_pa = 1e4};
   CHECK_NOTHROW(make(sound, 0.1, free, Vec3::Zero()));
   CHECK_THROWS_AS(make({.youngs_modulus_pa = 0}, 0.1, free, Vec3::Zero()), std::invalid_argument);

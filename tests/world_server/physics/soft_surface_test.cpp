@@ -84,7 +84,8 @@ TEST_CASE("a push reaches the nodes under its line of action and no others") {
   CHECK(pushed < 30);
 }
 
-TEST_CASE("the compliance is that of the surface under the pad, and smooth under a sliding finger") {
+TEST_CASE(
+    "the compliance is that of the surface under the pad, and smooth under a sliding finger") {
   const SoftBody body = Block(1e4);
   const SoftSurface surface(body);
   double least = 1e9, most = 0, last = 0;
@@ -119,7 +120,8 @@ TEST_CASE("two springs in series, and a damper that is never more than the finge
   CHECK(SoftSurface::InSeries({0, 2}, bare).stiffness_n_per_m == Approx(500));
 }
 
-TEST_CASE("a steady push moves the surface by compliance times force, and the finger is told back") {
+TEST_CASE(
+    "a steady push moves the surface by compliance times force, and the finger is told back") {
   SoftBody body = Block(1e4);
   const SoftSurface surface(body);
   const Vec3 point(0.003, 0.004, kHalf.z()), force(0, 0, -0.02);
