@@ -25,6 +25,7 @@ struct Pose {
     const Quat back = orientation.conjugate();
     return {-(back * position), back};
   }
+  bool operator==(const Pose&) const = default;
 };
 
 inline Vec3 ToVec3(const std::array<double, 3>& v) {

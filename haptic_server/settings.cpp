@@ -90,16 +90,18 @@ ConfigSchema DaemonSchema(Settings& settings) {
               "The file that describes the display, relative to this one.");
 
   HandSettings& hand = settings.hand;
-  schema.Choice("hand.script", &hand.script,
-                {{"push", HandScript::kPush}, {"rest", HandScript::kRest}},
-                "What the simulated hand does.");
+  schema.Choice(
+      "hand.script", &hand.script,
+      {{"push", HandScript::kPush}, {"stir", HandScript::kStir}, {"rest", HandScript::kRest}},
+      "What the simulated hand does.");
   schema.Number("hand.mass_kg", &hand.mass_kg, 0.001, 100, "Mass of the hand alone.");
   schema.Number("hand.damping_ns_per_m", &hand.damping_ns_per_m, 0, 1000,
                 "Damping of the hand alone.");
   schema.Number("hand.stiffness_n_per_m", &hand.stiffness_n_per_m, 0, 1e5,
                 "Stiffness of the hand about its intended path.");
   schema.Vector("hand.home_mm", &hand.home_mm, -1000, 1000, "Where a push starts and ends.");
-  schema.Vector("hand.stroke_mm", &hand.stroke_mm, -1000, 1000, "The reach of one push.");
+  schema.Vector("hand.stroke_mm", &hand.stroke_mm, -1000, 1000,
+                "The reach of one push, the box of a stirring hand.");
   schema.Number("hand.reach_ms", &hand.reach_ms, 1, 1e5, "Duration of the way there.");
   schema.Number("hand.hold_ms", &hand.hold_ms, 0, 1e5, "Duration of the stay there.");
   schema.Number("hand.return_ms", &hand.return_ms, 1, 1e5, "Duration of the way back.");

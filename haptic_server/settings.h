@@ -65,7 +65,7 @@ struct DeviceSettings {
   std::string file;  // motor positions, counts, tension bounds: config/devices/*.ini
 };
 
-enum class HandScript { kPush, kRest };
+enum class HandScript { kPush, kStir, kRest };
 
 /// The simulated hand: a minimum-jerk motor program plus the impedance of the hand. numerics 5.
 /// Mass and damping are of the hand alone; the device's own are in the device file.
@@ -75,7 +75,7 @@ struct HandSettings {
   double damping_ns_per_m = 15;
   double stiffness_n_per_m = 500;
   Vec3 home_mm = Vec3(-50, 0, 0);    // where a push starts and ends
-  Vec3 stroke_mm = Vec3(110, 0, 0);  // the reach of one push
+  Vec3 stroke_mm = Vec3(110, 0, 0);  // the reach of one push, the box of a stirring hand
   double reach_ms = 300;             // there
   double hold_ms = 100;
   double return_ms = 300;       // and back

@@ -8,15 +8,10 @@
 
 #include "common/clock.h"
 #include "haptic_server/device/mapping.h"
-#include "haptic_server/render/contact_solve.h"
-#include "haptic_server/render/feature_track.h"
+#include "haptic_server/render/contact_render.h"
 #include "haptic_server/render/ledger.h"
-#include "haptic_server/render/local_bodies.h"
-#include "haptic_server/render/surface_force.h"
-#include "haptic_server/render/surface_motion.h"
 #include "haptic_server/safety/emergency_stop.h"
 #include "haptic_server/safety/energy_meter.h"
-#include "haptic_server/safety/peer_watch.h"
 #include "haptic_server/safety/safety_stage.h"
 #include "haptic_server/safety/split_energy.h"
 
@@ -27,9 +22,6 @@ using protocol::ForceReason;
 using protocol::PeerState;
 
 constexpr std::uint32_t kPointer = 0;
-constexpr std::int64_t kShortestFrameNs = 1'000;
-constexpr std::uint64_t kLongestFrameNs = 10'000'000'000;
-
 // The acks of frames lie a few world periods back; a world that stalls for seconds resumes with new
 // ticks.
 std::uint64_t HistoryTicks(const Settings& settings) {
@@ -43,21 +35,13 @@ std::uint64_t ReplayTicks(const Settings& settings) {
   return static_cast<std::uint64_t>(4 * world_period_s * settings.loop.rate_hz) + 64;
 }
 
+std::int64_t ElapsedTicks(const TickTime& time) {
+  return 1 + std::max<std::int64_t>(time.missed, 0);
+}
+
 bool IsSound(const DeviceSample& sample) {
   return sample.position.allFinite() && sample.velocity.allFinite() &&
          sample.position.cwiseAbs().maxCoeff() <= kLargestCoordinate;
-}
-
-Vec3 Sum(std::span<const BodyShare> shares) {
-  Vec3 sum = Vec3::Zero();
-  for (const BodyShare& share : shares) sum += share.force;
-  return sum;
-}
-
-// How much of `whole` is left in `part`, 0..1.
-double Fraction(const Vec3& part, const Vec3& whole) {
-  const double square = whole.squaredNorm();
-  return square > 0 && std::isfinite(square) ? std::clamp(part.dot(whole) / square, 0.0, 1.0) : 0;
 }
 
 // Denormal numbers mean nothing in metres and cost a slow path in the processor.
@@ -73,17 +57,15 @@ struct HapticStep::State {
   State(const Settings& checked, Device& used_device, std::uint64_t own_epoch)
       : settings(checked),
         period_ns(checked.period_ns()),
-        radius(checked.render.finger_radius_mm * 1e-3),
         device(used_device),
         mapping(checked.mapping),
-        track(checked.render.display, period_ns),
-        copies(period_ns, ReplayTicks(checked), own_epoch, checked.render.position_rule),
-        surface_force(checked.render, Seconds(period_ns)),
+        intake(checked, ReplayTicks(checked), own_epoch),
+        contact(checked.render, kPointer, Seconds(period_ns)),
         ledger(period_ns, HistoryTicks(checked), own_epoch),
-        peer(checked),
         safety(checked),
         energy(checked),
-        split({.stiffness_n_per_m = checked.render.stiffness_n_per_m, .finger_radius_m = radius},
+        split({.stiffness_n_per_m = checked.render.stiffness_n_per_m,
+               .finger_radius_m = contact.radius()},
               ReplayTicks(checked), own_epoch) {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
     health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
@@ -93,25 +75,20 @@ struct HapticStep::State {
   }
 
   bool TakeSample(DeviceSample measured, bool clutched) noexcept;
-  bool TakeFrame(const WorldInput& world) noexcept;
-  bool WatchWorld(const TickTime& time, const WorldInput& world, bool finger_known) noexcept;
-  std::span<const BodyShare> Render(std::int64_t elapsed_ticks, bool& no_channel) noexcept;
-  void Release() noexcept;
+  std::span<const BodyShare> Render(const TickTime& time, SafetyInput& input) noexcept;
+  void MeasureEnergy(const TickTime& time, const DeviceSample& measured, double split_work,
+                     SafetyInput& input) noexcept;
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
                protocol::HapticTick& message) noexcept;
 
   const Settings settings;
   const std::int64_t period_ns;
-  const double radius;  // m
   Device& device;
   Mapping mapping;
 
-  FeatureTrack track;
-  LocalBodies copies;
-  SurfaceForce surface_force;
-  SurfaceMotion surface_motion;
+  WorldIntake intake;
+  ContactRender contact;
   Ledger ledger;
-  PeerWatch peer;
   EmergencyStop emergency_stop;
   SafetyStage safety;
   EnergyMeter energy;
@@ -119,20 +96,10 @@ struct HapticStep::State {
 
   std::uint64_t tick = 0;
   std::int64_t start_ns = 0;
-  DeviceSample sample;                   // the last sound one, in W
-  double penetration = 0;                // m, |e| of the tick before
-  SurfaceMotion::WorkDone surface_work;  // since then
-  double stored = 0;                     // J, in the rendered springs
-  std::uint64_t newest_epoch = 0;        // of the newest sound frame, and its number
-  std::uint64_t newest_frame = 0;
-  std::uint64_t shown_epoch = 0;  // whose surfaces are in the track; 0 = none
-  std::uint64_t shown_frame = 0;
-  std::uint64_t channel_epoch = 0;  // whose bodies the channels are about
+  DeviceSample sample;  // the last sound one, in W
   std::uint64_t missed_in_a_row = 0;
   std::int64_t bounded_period_ns = 0;  // of the world that health.zero_force_after_ns is about
   Vec3 displayed = Vec3::Zero();       // N, in W
-  std::array<HalfSpace, kMaxContactPlanes> planes;
-  std::array<BodyShare, kMaxShares> shares;
   protocol::HapticHealth health;
 };
 
@@ -150,94 +117,40 @@ bool HapticStep::State::TakeSample(DeviceSample measured, bool clutched) noexcep
   return true;
 }
 
-// Whether a new frame came that may be used, and books its ack if so. // RT:
-bool HapticStep::State::TakeFrame(const WorldInput& world) noexcept {
-  if (world.frame == nullptr || world.epoch == 0) return false;
-  const protocol::WorldFrame& frame = *world.frame;
-  const bool is_new = world.epoch != newest_epoch || frame.frame > newest_frame;
-  const bool is_sound = frame.plane_count <= protocol::kMaxPlanes &&
-                        frame.period_ns >= kShortestFrameNs && frame.period_ns <= kLongestFrameNs;
-  if (!is_new || !is_sound) return false;
-  newest_epoch = world.epoch;
-  newest_frame = frame.frame;
-  ledger.Receive(world.epoch, frame);
-  return true;
+// What each body is to get of the force, where there is a world to touch. // RT:
+std::span<const BodyShare> HapticStep::State::Render(const TickTime& time,
+                                                     SafetyInput& input) noexcept {
+  const bool has_world = input.peer == PeerState::kLive || input.peer == PeerState::kLate ||
+                         input.peer == PeerState::kLost;
+  if (!has_world || !input.sample_finite || input.stopped || input.clutched) {
+    contact.Reset();
+    return {};
+  }
+  return contact.Update({.tick = tick,
+                         .position = sample.position,
+                         .displayed = displayed,
+                         .elapsed_ticks = ElapsedTicks(time)},
+                        intake.track(), intake.copies(), ledger, input.no_channel);
 }
 
-// Peer watch and feature track. True if a frame came that is displayed from now on. // RT:
-bool HapticStep::State::WatchWorld(const TickTime& time, const WorldInput& world,
-                                   bool finger_known) noexcept {
-  const std::int64_t elapsed_ticks = 1 + std::max<std::int64_t>(time.missed, 0);
-  const bool fresh = TakeFrame(world);
-  const PeerSign sign{
-      .epoch = world.epoch,
-      .ready = world.ready,
-      .heartbeat_ns = world.heartbeat_ns,
-      .fresh_frame = fresh,
-      .frame_period_ns = fresh ? static_cast<std::int64_t>(world.frame->period_ns) : 0};
-  const PeerState state = peer.Update(time.start_ns, sign, safety.is_zero());
-
-  if (tick > 0) track.Advance(elapsed_ticks);
-  if (state == PeerState::kAbsent && shown_epoch != 0) {
-    track.Clear();
-    copies.Clear();
-    Release();
-    shown_epoch = shown_frame = 0;
+// `split_work`: J, in W, what the split between the processes added. // RT:
+void HapticStep::State::MeasureEnergy(const TickTime& time, const DeviceSample& measured,
+                                      double split_work, SafetyInput& input) noexcept {
+  if (!input.sample_finite) {
+    energy.Skip();
+    return;
   }
-  if (!fresh || !peer.Accepts(world.epoch)) return false;
-  if (channel_epoch != world.epoch) {
-    ledger.BeginWorld(world.epoch);
-    channel_epoch = world.epoch;
-  }
-  // A surface as deep as the present contact, or as the finger gets in a tick or two, is no
-  // surprise.
-  const double speed = finger_known ? sample.velocity.stableNorm() : 0;
-  const double approach = speed * Seconds(period_ns) * static_cast<double>(1 + elapsed_ticks);
-  const FingerState finger{sample.position, radius, penetration + approach + 1e-6};
-  copies.Receive(*world.frame, tick);
-  track.Receive(*world.frame, std::span(&finger, 1), copies);
-  shown_epoch = world.epoch;
-  shown_frame = world.frame->frame;
-  return true;
-}
-
-// No contact in this tick. // RT:
-void HapticStep::State::Release() noexcept {
-  surface_force.Reset();
-  surface_motion.Reset();
-  penetration = 0;
-  surface_work = {};
-  stored = 0;
-}
-
-// Contact solve and surface force at the last sound sample. Movable bodies without a channel are
-// left out.
-// RT:
-std::span<const BodyShare> HapticStep::State::Render(std::int64_t elapsed_ticks,
-                                                     bool& no_channel) noexcept {
-  track.MoveFinger(kPointer, sample.position);
-  const std::span<const Surface> surfaces = track.Surfaces(copies);
-  for (std::size_t i = 0; i < surfaces.size(); ++i) planes[i] = surfaces[i].plane;
-  const ContactSolution contact =
-      SolveContact(sample.position, radius, std::span(planes).first(surfaces.size()));
-  penetration = contact.displacement.norm();
-  surface_work = surface_motion.Work(surfaces, displayed,
-                                     Seconds(period_ns) * static_cast<double>(elapsed_ticks));
-  surface_motion.Remember(surfaces, contact);
-  std::size_t count = 0;
-  for (const BodyShare& share : surface_force.Update(surfaces, contact, radius, elapsed_ticks)) {
-    if (share.fixed || ledger.Open(share.body, share.generation, kPointer, tick)) {
-      shares[count++] = share;
-    } else {
-      no_channel = true;
-    }
-  }
-  const Vec3 as_sprung = Sum(std::span(shares).first(count));
-  copies.SolveStiff(std::span(shares).first(count));
-  // What was solved together with its copy holds as much less: f^2/2k.
-  const double left = Fraction(Sum(std::span(shares).first(count)), as_sprung);
-  stored = left * left * surface_force.stored();
-  return std::span(shares).first(count);
+  const double energy_scale = mapping.energy_on_device();
+  energy.Measure({.position = measured.position,
+                  .velocity = measured.velocity,
+                  .duration_s = Seconds(time.previous_duration_ns),
+                  .surface_work = energy_scale * contact.surface_work().all,
+                  .split_work = energy_scale * split_work,
+                  .stored = energy_scale * contact.stored(),
+                  .penetration = contact.penetration(),
+                  .world_period_s = Seconds(intake.peer().world_period_ns())});
+  input.velocity = measured.velocity;
+  if (settings.safety.passivity_controller) input.brake = energy.Brake();
 }
 
 // RT:
@@ -248,8 +161,8 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   message.period_ns = static_cast<std::uint64_t>(period_ns);
   message.previous_duration_ns =
       static_cast<std::uint64_t>(std::max<std::int64_t>(time.previous_duration_ns, 0));
-  message.world_epoch = shown_epoch;
-  message.world_frame = shown_frame;
+  message.world_epoch = intake.shown_epoch();
+  message.world_frame = intake.shown_frame();
   message.stiffness = settings.render.stiffness_n_per_m;
   message.damping = settings.render.damping_ns_per_m;
   message.force_cap = settings.safety.force_cap_n * mapping.force_in_world();
@@ -258,7 +171,7 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   pointer = {};
   pointer.pointer = kPointer;
   pointer.reason = reason;
-  pointer.radius = radius;
+  pointer.radius = contact.radius();
   pointer.position = ToArray(sample.position);
   pointer.velocity = ToArray(sample.velocity);
   pointer.force = ToArray(force);
@@ -270,9 +183,10 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   health.worst_missed_in_a_row = std::max(health.worst_missed_in_a_row, missed_in_a_row);
   health.reason_ticks = reason == health.reason ? health.reason_ticks + 1 : 0;
   health.reason = reason;
+  const PeerWatch& peer = intake.peer();
   health.peer_state = peer.state();
   health.peer_epoch = peer.epoch();
-  const bool has_frame = shown_epoch != 0;
+  const bool has_frame = intake.shown_epoch() != 0;
   health.feature_age_ns =
       has_frame
           ? static_cast<std::uint64_t>(std::max<std::int64_t>(peer.frame_age_ns(time.start_ns), 0))
@@ -291,7 +205,7 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
                    .flagged = energy.times_flagged(),
                    .unstable = energy.unstable() ? 1U : 0U,
                    .controller = reason == ForceReason::kPassivity ? 1U : 0U};
-  health.reconciliation = copies.reconciliation();
+  health.reconciliation = intake.copies().reconciliation();
 
   displayed = force;
   start_ns = time.start_ns;
@@ -315,41 +229,28 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
       input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
   if (input.sample_finite) input.speed = measured.velocity.stableNorm();
 
-  const bool is_displayed = state.WatchWorld(time, world, input.sample_finite);
+  const Vec3 velocity = input.sample_finite ? state.sample.velocity : Vec3(Vec3::Zero());
+  const bool is_displayed = state.intake.Update(world,
+                                                {.tick = state.tick,
+                                                 .start_ns = time.start_ns,
+                                                 .elapsed_ticks = ElapsedTicks(time),
+                                                 .position = state.sample.position,
+                                                 .velocity = velocity,
+                                                 .radius = state.contact.radius(),
+                                                 .penetration = state.contact.penetration()},
+                                                state.safety.is_zero(), state.ledger);
 
-  const PeerState peer = state.peer.state();
+  input.peer = state.intake.peer().state();
   input.stopped = state.emergency_stop.Update(wish.stop, wish.enable, measured.enabled);
   input.clutched = wish.clutch;
-  std::span<const BodyShare> shares;
-  Vec3 wanted = Vec3::Zero();
-  if (input.sample_finite && !input.stopped && !input.clutched &&
-      (peer == PeerState::kLive || peer == PeerState::kLate || peer == PeerState::kLost)) {
-    shares = state.Render(1 + std::max<std::int64_t>(time.missed, 0), input.no_channel);
-    wanted = Sum(shares);
-  } else {
-    state.Release();
-  }
-  state.split.Moved(state.surface_work.split);
+  const std::span<const BodyShare> shares = state.Render(time, input);
+  const LocalBodies& copies = state.intake.copies();
+  state.split.Moved(state.contact.surface_work().split);
   const double split_work =
-      is_displayed ? state.split.Receive(world.epoch, *world.frame, state.copies, state.tick) : 0;
-  const double energy_scale = state.mapping.energy_on_device();
-  if (input.sample_finite) {
-    state.energy.Measure({.position = measured.position,
-                          .velocity = measured.velocity,
-                          .duration_s = Seconds(time.previous_duration_ns),
-                          .surface_work = energy_scale * state.surface_work.all,
-                          .split_work = energy_scale * split_work,
-                          .stored = energy_scale * state.stored,
-                          .penetration = state.penetration,
-                          .world_period_s = Seconds(state.peer.world_period_ns())});
-    input.velocity = measured.velocity;
-    if (state.settings.safety.passivity_controller) input.brake = state.energy.Brake();
-  } else {
-    state.energy.Skip();
-  }
+      is_displayed ? state.split.Receive(world.epoch, *world.frame, copies, state.tick) : 0;
+  state.MeasureEnergy(time, measured, split_work, input);
 
-  input.wanted = state.mapping.ForceOnDevice(wanted);
-  input.peer = peer;
+  input.wanted = state.mapping.ForceOnDevice(Sum(shares));
   input.previous_duration_ns = time.previous_duration_ns;
   input.missed = time.missed;
   const Vec3 command = state.safety.Limit(input);
@@ -371,12 +272,12 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
                      .wanted = shares,
                      .finger = state.sample.position});
   state.split.Book(state.tick, state.sample.position, state.ledger.Booked());
-  state.copies.Step(state.tick, state.ledger.Booked(),
-                    state.tick == 0
-                        ? Seconds(state.period_ns)
-                        : Seconds(std::max<std::int64_t>(time.previous_duration_ns, 0)));
+  state.intake.copies().Step(state.tick, state.ledger.Booked(),
+                             state.tick == 0
+                                 ? Seconds(state.period_ns)
+                                 : Seconds(std::max<std::int64_t>(time.previous_duration_ns, 0)));
   state.ledger.CloseIdle(kPointer, state.tick, [&](std::uint32_t body, std::uint32_t generation) {
-    return state.track.Has(body, generation, kPointer);
+    return state.intake.track().Has(body, generation, kPointer);
   });
   state.Publish(time, displayed, state.safety.reason(), message);
 }

@@ -9,6 +9,7 @@
 
 #include "haptic_server/device/device.h"
 #include "haptic_server/settings.h"
+#include "haptic_server/world_intake.h"
 #include "protocol/messages.h"
 
 namespace rikiseki::haptic {
@@ -18,15 +19,6 @@ struct TickTime {
   std::int64_t start_ns = 0;              // t_k
   std::int64_t previous_duration_ns = 0;  // the true t_k - t_(k-1); 0 on the first tick
   std::int64_t missed = 0;                // deadlines skipped between the tick before and this one
-};
-
-/// What the shell knows of the world at this tick.
-struct WorldInput {
-  std::uint64_t epoch = 0;        // of the attached segment; 0 = none
-  bool ready = false;             // its owner says so, and lives
-  std::int64_t heartbeat_ns = 0;  // its owner's last sign of life
-  const protocol::WorldFrame* frame =
-      nullptr;  // the newest frame, if it was not handed over before
 };
 
 /// What an operator asks for in this tick, beside what the finger does.

@@ -1,20 +1,18 @@
 // world_server: runs a dynamic rigid-body world at 10-60 Hz for a haptic server beside it.
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <csignal>
 #include <cstdio>
-#include <future>
+#include <utility>
 
 #include "common/clock.h"
 #include "common/daemon.h"
 #include "common/logging.h"
 #include "common/version.h"
 #include "world_server/loop.h"
-#include "world_server/physics/deformable_world.h"
 #include "world_server/scene/needs.h"
 #include "world_server/scene/scene_message.h"
-#include "world_server/scene/sdf_loader.h"
+#include "world_server/scene_reload.h"
 
 namespace {
 
@@ -24,27 +22,30 @@ using namespace rikiseki::world;  // NOLINT(google-build-using-namespace)
 // Room in world.bodies for scenes that grow when they are reloaded.
 constexpr std::uint32_t kBodyRoom = 256;
 
-struct ReadyScene {
-  LoadedScene loaded;
-  std::unique_ptr<DynamicsWorld> dynamics;
-};
-
-ReadyScene Load(const Settings& settings) {
-  ReadyScene ready;
-  ready.loaded = LoadSdf(settings.scene.file);
-  for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
-  ready.dynamics = MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
-  return ready;
+SceneUse UseOf(const Settings& settings) {
+  return {.coupling = settings.coupling.coupling,
+          .finger_friction = settings.features.finger_friction};
 }
 
 // Tells observers of every scene that runs, once.
 class SceneAnnouncer {
  public:
-  explicit SceneAnnouncer(const protocol::SegmentOwner& owner)
-      : writer_(owner.Stream(protocol::StreamType::kWorldScene)) {}
+  SceneAnnouncer(const protocol::SegmentOwner& owner, const SceneUse& use, std::uint32_t body_room)
+      : writer_(owner.Stream(protocol::StreamType::kWorldScene)),
+        use_(use),
+        body_room_(body_room) {}
 
-  void Publish(const Scene& scene, const WorldStep& step) {
-    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_);
+  void Publish(const WorldStep& step) {
+    const Scene& scene = step.scene();
+    const protocol::WorldScene message = DescribeScene(scene, step.Bodies(), ++revision_, use_);
+    spdlog::info("needs: {}", InWords(message.needs));
+    spdlog::info("left out: {}", InWords(message.left_out));
+    if (scene.bodies.size() > body_room_) {
+      spdlog::warn(
+          "scene {} has grown to {} bodies, and world.bodies has room for {}: observers see none "
+          "of them move until world_server is restarted",
+          scene.name, scene.bodies.size(), body_room_);
+    }
     if (!writer_.Publish(message, static_cast<std::uint64_t>(MonotonicNow()))) {
       spdlog::warn(
           "scene {} has grown beyond the room in world.scene: observers see the old shapes "
@@ -55,49 +56,24 @@ class SceneAnnouncer {
 
  private:
   protocol::SceneWriter writer_;
+  SceneUse use_;
+  std::uint32_t body_room_;
   std::uint64_t revision_ = 0;
 };
 
-// Reads the scene again beside the running loop: parsing takes many world ticks.
-class SceneReload {
- public:
-  SceneReload(const Settings& settings, SceneAnnouncer& announcer)
-      : settings_(settings), announcer_(announcer) {}
-
-  /// A second request while one is under way starts another after it.
-  void Request() { ++requests_; }
-
-  /// Starts what was requested, and puts what is ready in the place of the running scene. If the file is
-  /// refused, the running scene stays.
-  void Poll(WorldStep& step) {
-    if (loading_.valid() &&
-        loading_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-      try {
-        ReadyScene ready = loading_.get();
-        spdlog::info("scene {} loaded anew: {} bodies", ready.loaded.scene.name,
-                     ready.loaded.scene.bodies.size());
-        step.Replace(ready.loaded.scene, std::move(ready.dynamics));
-        announcer_.Publish(ready.loaded.scene, step);
-      } catch (const std::exception& error) {
-        spdlog::error("the scene stays as it was: {}", error.what());
-      }
-    }
-    if (requests_ > 0 && !loading_.valid()) {
-      requests_ = 0;
-      loading_ = std::async(std::launch::async, [this] { return Load(settings_); });
-    }
+// Says what became of reading the scene again.
+void Tell(const ReloadReport& report, const WorldStep& step, SceneAnnouncer& announcer) {
+  for (const std::string& warning : report.warnings) spdlog::warn("{}", warning);
+  if (!report.replaced) {
+    spdlog::error("the scene stays as it was: {}", report.refused);
+    return;
   }
-
- private:
-  const Settings& settings_;
-  SceneAnnouncer& announcer_;
-  int requests_ = 0;
-  std::future<ReadyScene> loading_;
-};
+  spdlog::info("scene {} loaded anew: {} bodies", step.scene().name, step.scene().bodies.size());
+  announcer.Publish(step);
+}
 
 void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
-                     protocol::PeerLink& link, SceneAnnouncer& announcer) {
-  SceneReload reload(settings, announcer);
+                     protocol::PeerLink& link, SceneAnnouncer& announcer, SceneReload& reload) {
   PeriodicSchedule schedule(MonotonicNow(), settings.period_ns());
   std::int64_t missed = 0;
   while (true) {
@@ -108,12 +84,12 @@ void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
       case SIGTERM:
         return;
       case SIGHUP:
-        reload.Request();
+        reload.Restart();
         break;
       default:
         break;
     }
-    reload.Poll(step);
+    if (const auto report = reload.Poll(step)) Tell(*report, step, announcer);
     loop.Tick(now_ns, schedule.deadline_ns(), missed);
     for (const std::string& line : link.PollNews()) spdlog::info("haptic side: {}", line);
     missed = schedule.Advance(MonotonicNow());
@@ -129,11 +105,12 @@ int Run(int argc, char** argv) {
   std::string description;
   const Settings settings = LoadSettings(options.config, overrides, &description);
   StartLogging("world_server");
-  ReadyScene ready = Load(settings);
+  ReadyScene ready = LoadScene(settings);
+  for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
   const Scene& scene = ready.loaded.scene;
   if (options.check) {
     std::fputs(description.c_str(), stdout);
-    const SceneNeeds needs = WorkOutNeeds(scene);
+    const SceneNeeds needs = WorkOutNeeds(scene, UseOf(settings));
     std::printf("scene %s: %zu bodies\nneeds: %s\nleft out: %s\n", scene.name.c_str(),
                 scene.bodies.size(), InWords(needs.needs).c_str(), InWords(needs.left_out).c_str());
     return kExitOk;
@@ -160,9 +137,10 @@ int Run(int argc, char** argv) {
   WorldLoop loop(settings, step, owner, link);
   spdlog::info("{} at {} Hz, scene {} with {} bodies, build {}", owner.name(),
                settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
-  SceneAnnouncer announcer(owner);
-  announcer.Publish(scene, step);
-  RunUntilStopped(settings, step, loop, link, announcer);
+  SceneAnnouncer announcer(owner, UseOf(settings), body_room);
+  announcer.Publish(step);
+  SceneReload reload(settings, std::move(ready.loaded.files));
+  RunUntilStopped(settings, step, loop, link, announcer, reload);
   spdlog::info("stopped");
   return kExitOk;
 }

@@ -10,6 +10,8 @@ void Bind(ConfigSchema& schema, Settings& settings) {
   schema.Number("loop.rate_hz", &settings.loop.rate_hz, 1, 1000,
                 "world ticks per second: 10 to 60 is what the project is for");
   schema.Path("scene.file", &settings.scene.file, "the SDFormat world to run");
+  schema.Flag("scene.watch", &settings.scene.watch,
+              "whether the running scene follows its files as they are edited");
   schema.Number("physics.substep_ms", &settings.physics.substep_ms, 0.05, 10,
                 "longest step of the rigid-body engine: stacks need 1, lone bodies bear 5");
   schema.Choice<protocol::Coupling>(

@@ -15,7 +15,8 @@ struct LoopSettings {
 };
 
 struct SceneSettings {
-  std::string file;  // an SDFormat world
+  std::string file;   // an SDFormat world
+  bool watch = true;  // its files, and change the running scene as they change
 };
 
 struct PhysicsSettings {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "world_server/body_numbers.h"
 #include "world_server/coupling/kick.h"
 #include "world_server/coupling/ledger_reader.h"
 #include "world_server/coupling/replay.h"
@@ -12,13 +13,21 @@
 
 namespace rikiseki::world {
 
+namespace {
+
+// Substeps that are taken back when another engine goes on: they find the impulses by which bodies
+// at rest carry each other, which the engine before knew.
+constexpr int kWarmUp = 4;
+
+}  // namespace
+
 struct WorldStep::State {
   Settings settings;
   Scene scene;
   std::unique_ptr<DynamicsWorld> dynamics;
   std::unique_ptr<PlaneFinder> plane_finder;  // of this scene
   std::vector<BodyState> states;
-  std::vector<std::uint32_t> generations;  // may be longer than the scene: numbers are never reused
+  BodyNumbers numbers;
   LedgerReader ledger;
   std::vector<Finger> fingers;   // of the newest message
   double stiffness_n_per_m = 0;  // that it renders with
@@ -35,30 +44,37 @@ struct WorldStep::State {
     health.period_ns = static_cast<std::uint64_t>(given.period_ns());
   }
 
-  void Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics);
+  void Adopt(Scene new_scene, std::unique_ptr<DynamicsWorld> new_dynamics,
+             std::span<const BodyChange> changes);
+  void GoOn(std::span<const BodyChange> changes);
+  void NameOnWire(protocol::WorldFrame& told) const;
   void ReadStates();
   void Advance(double period_s);
   void Penalise(double period_s);
+  void Push(std::span<const Kick> kicks, double period_s);
 };
 
-void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWorld> new_dynamics) {
+void WorldStep::State::Adopt(Scene new_scene, std::unique_ptr<DynamicsWorld> new_dynamics,
+                             std::span<const BodyChange> changes) {
   if (!new_dynamics || new_dynamics->body_count() != new_scene.bodies.size()) {
     throw std::invalid_argument("the dynamics must hold exactly the bodies of the scene");
   }
-  scene = new_scene;
+  scene = std::move(new_scene);
   dynamics = std::move(new_dynamics);
-  plane_finder = std::make_unique<PlaneFinder>(scene, dynamics.get());
-  for (std::uint32_t& generation : generations) ++generation;
-  generations.resize(std::max(generations.size(), scene.bodies.size()), 1);
+  numbers.Advance(changes);
+  auto finder = std::make_unique<PlaneFinder>(scene, dynamics.get());
+  if (plane_finder) finder->Continue(*plane_finder, changes);
+  plane_finder = std::move(finder);
+  GoOn(changes);
 
-  std::vector<BodyTag> tags;
+  std::vector<BodyTag> tags(numbers.bound());
   bodies.assign(scene.bodies.size(), {});
   health.moving_bodies = 0;
   for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
     const SceneBody& body = scene.bodies[i];
-    tags.push_back({.generation = generations[i], .movable = !body.fixed});
-    bodies[i].body = static_cast<std::uint32_t>(i);
-    bodies[i].generation = generations[i];
+    bodies[i].body = numbers.numbers()[i];
+    bodies[i].generation = numbers.generations()[i];
+    tags[bodies[i].body] = {.generation = bodies[i].generation, .movable = !body.fixed, .place = i};
     bodies[i].mass = body.fixed ? 0 : body.mass_kg;
     if (!body.fixed) ++health.moving_bodies;
   }
@@ -67,6 +83,19 @@ void WorldStep::State::Adopt(const Scene& new_scene, std::unique_ptr<DynamicsWor
   const std::size_t length = std::min(scene.name.size(), health.scene.size() - 1);
   std::copy_n(scene.name.begin(), length, health.scene.begin());
   ReadStates();
+}
+
+void WorldStep::State::GoOn(std::span<const BodyChange> changes) {
+  bool any = false;
+  std::vector<BodyState> start;
+  for (std::size_t i = 0; i < changes.size(); ++i) {
+    start.push_back(changes[i].goes_on ? states[*changes[i].before] : dynamics->State(i));
+    any = any || changes[i].goes_on;
+  }
+  for (int substep = 0; any && substep <= kWarmUp; ++substep) {
+    if (substep > 0) dynamics->ApplyAndStep({}, settings.physics.substep_ms * 1e-3);
+    for (std::size_t i = 0; i < start.size(); ++i) dynamics->SetState(i, start[i]);
+  }
 }
 
 void WorldStep::State::ReadStates() {
@@ -94,7 +123,14 @@ void WorldStep::State::Penalise(double period_s) {
   Vec3 penalty = ToVec3(health.penalty_impulse);
   for (const Kick& kick : kicks) penalty += kick.impulse;
   health.penalty_impulse = ToArray(penalty);
-  dynamics->ApplyAndStep(kicks, period_s);
+  Push(kicks, period_s);
+}
+
+// All at the start of the period.
+void WorldStep::State::Push(std::span<const Kick> kicks, double period_s) {
+  dynamics->ApplyAndStep(kicks, 0);
+  const Stretch whole{.length_s = period_s};
+  dynamics->Play({&whole, 1});
 }
 
 // Coupling and physics.
@@ -107,15 +143,29 @@ void WorldStep::State::Advance(double period_s) {
     ReplayPush(ledger.replay(), period_s, settings.coupling.force_cap_n * settings.gap_s(),
                *dynamics);
   } else {
-    dynamics->ApplyAndStep(ImpulseKicks(owed, states), period_s);
+    Push(ImpulseKicks(owed, states), period_s);
   }
   ReadStates();
 }
 
-WorldStep::WorldStep(const Settings& settings, const Scene& scene,
-                     std::unique_ptr<DynamicsWorld> dynamics, std::uint64_t own_epoch)
+// Stations before this one know a body by its place in the scene.
+void WorldStep::State::NameOnWire(protocol::WorldFrame& told) const {
+  for (protocol::Plane& plane : std::span(told.planes).first(told.plane_count)) {
+    plane.body = numbers.numbers()[plane.body];
+  }
+  for (protocol::LocalBody& local : std::span(told.local_bodies).first(told.local_body_count)) {
+    local.body = numbers.numbers()[local.body];
+    for (protocol::ContactPlane& contact : std::span(local.contacts).first(local.contact_count)) {
+      contact.other_body = numbers.numbers()[contact.other_body];
+    }
+  }
+}
+
+WorldStep::WorldStep(const Settings& settings, Scene scene, std::unique_ptr<DynamicsWorld> dynamics,
+                     std::uint64_t own_epoch)
     : state_(std::make_unique<State>(settings, own_epoch)) {
-  state_->Adopt(scene, std::move(dynamics));
+  const std::vector<BodyChange> all_new(scene.bodies.size());
+  state_->Adopt(std::move(scene), std::move(dynamics), all_new);
 }
 
 WorldStep::~WorldStep() = default;
@@ -152,23 +202,32 @@ void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   frame.coupling = s.settings.coupling.coupling;
   const FeatureReach reach{.radius_m = s.settings.features.radius_mm * 1e-3,
                            .period_s = static_cast<double>(s.settings.period_ns()) * 1e-9};
-  frame.plane_count = s.plane_finder->Find(s.states, s.generations, s.fingers, reach, frame.planes);
+  const std::vector<std::uint32_t>& generations = s.numbers.generations();
+  frame.plane_count = s.plane_finder->Find(s.states, generations, s.fingers, reach, frame.planes);
   if (s.settings.coupling.coupling == protocol::Coupling::kLocal) {
-    frame.local_body_count = FindLocalBodies(s.scene, *s.dynamics, s.states, s.generations,
+    frame.local_body_count = FindLocalBodies(s.scene, *s.dynamics, s.states, generations,
                                              std::span(frame.planes).first(frame.plane_count),
                                              reach, frame.local_bodies);
     frame.local_substep_ns =
         static_cast<std::uint64_t>(std::llround(s.settings.physics.substep_ms * 1e6));
   }
+  s.NameOnWire(frame);
 
   s.health.frames = s.frame;
   s.health.applied = s.ledger.life_books().applied;
   s.health.discarded = s.ledger.life_books().discarded;
 }
 
-void WorldStep::Replace(const Scene& scene, std::unique_ptr<DynamicsWorld> dynamics) {
-  state_->Adopt(scene, std::move(dynamics));
+void WorldStep::Replace(Scene scene, std::unique_ptr<DynamicsWorld> dynamics, Replacement how) {
+  const std::vector<BodyChange> changes = how == Replacement::kRestart
+                                              ? Restarted(state_->scene, scene)
+                                              : Changed(state_->scene, scene);
+  state_->Adopt(std::move(scene), std::move(dynamics), changes);
   ++state_->health.resets;
+}
+
+const Scene& WorldStep::scene() const {
+  return state_->scene;
 }
 
 const std::vector<protocol::Body>& WorldStep::Bodies() const {

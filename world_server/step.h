@@ -14,11 +14,17 @@
 
 namespace rikiseki::world {
 
+/// What another scene does to what moves.
+enum class Replacement {
+  kChange,   // what the scene says differently is changed, everything else goes on: see Changed
+  kRestart,  // everything that moves begins anew: see Restarted
+};
+
 class WorldStep {
  public:
   /// `own_epoch` is the epoch of the segment that the frames will be published in; 0 accepts ticks
   /// whatever world they were displayed against (the laboratory).
-  WorldStep(const Settings& settings, const Scene& scene, std::unique_ptr<DynamicsWorld> dynamics,
+  WorldStep(const Settings& settings, Scene scene, std::unique_ptr<DynamicsWorld> dynamics,
             std::uint64_t own_epoch);
   ~WorldStep();
 
@@ -33,8 +39,12 @@ class WorldStep {
   /// pointer, and fills the next frame.
   void Tick(double period_s, protocol::WorldFrame& frame);
 
-  /// Puts another scene in the place of this one: bodies get new generations. The books go on.
-  void Replace(const Scene& scene, std::unique_ptr<DynamicsWorld> dynamics);
+  /// Puts another scene in the place of this one, with dynamics that nobody has stepped yet. What is
+  /// the same keeps its name on the wire, what goes on is where it was. The books go on: what is
+  /// pending for a body that is no more is discarded.
+  void Replace(Scene scene, std::unique_ptr<DynamicsWorld> dynamics, Replacement how);
+
+  const Scene& scene() const;
 
   /// All bodies, for observers.
   const std::vector<protocol::Body>& Bodies() const;

@@ -28,6 +28,11 @@ double ForceResponseSeries(const Impedance& impedance, double t) noexcept {
   return sum;
 }
 
+// 0 to below 1, the same on every machine.
+double Uniform(std::mt19937_64& random) noexcept {
+  return static_cast<double>(random() >> 11) * 0x1p-53;
+}
+
 }  // namespace
 
 double MinimumJerk(double q) noexcept {
@@ -44,8 +49,22 @@ MotorProgram::MotorProgram(Script script) : script_(std::move(script)), random_(
 }
 
 double MotorProgram::RandomRest() noexcept {
-  const double uniform = static_cast<double>(random_() >> 11) * 0x1p-53;  // alike everywhere
-  return script_.rest_s + script_.rest_jitter_s * uniform;
+  return script_.rest_s + script_.rest_jitter_s * Uniform(random_);
+}
+
+std::vector<Stroke> StirringStrokes(const Vec3& corner, const Vec3& opposite, double reach_s,
+                                    double hold_s, std::uint64_t seed, int count) {
+  std::mt19937_64 random(seed);
+  std::vector<Stroke> strokes;
+  for (int i = 0; i < count; ++i) {
+    Vec3 place = corner;
+    for (int axis = 0; axis < 3; ++axis) {
+      place[axis] += Uniform(random) * (opposite[axis] - corner[axis]);
+    }
+    strokes.push_back({place, reach_s});
+    if (hold_s > 0) strokes.push_back({place, hold_s});
+  }
+  return strokes;
 }
 
 Vec3 MotorProgram::operator()(double t_s) noexcept {

@@ -20,6 +20,11 @@ struct Stroke {
   double duration_s = 0;
 };
 
+/// `count` strokes to places drawn at random from the box between two of its corners [m], each
+/// followed by a stay of `hold_s`; the same for the same seed, everywhere.
+std::vector<Stroke> StirringStrokes(const Vec3& corner, const Vec3& opposite, double reach_s,
+                                    double hold_s, std::uint64_t seed, int count);
+
 /// C_d(t): strokes one after the other from `home`, then a rest of `rest_s` plus a random part
 /// uniform in 0..`rest_jitter_s`; then from the start again if `repeats`, else it stays where the
 /// strokes ended.

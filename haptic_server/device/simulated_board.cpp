@@ -9,20 +9,32 @@ namespace {
 
 constexpr std::int64_t kLongestStepNs = 1'000'000;
 
-MotorProgram::Script PushScript(const HandSettings& hand) {
+constexpr int kStirringStrokes = 500;  // then again from the first
+
+MotorProgram::Script ScriptOf(const HandSettings& hand) {
   const Vec3 home = hand.home_mm * 1e-3;
   const Vec3 reach = home + hand.stroke_mm * 1e-3;
   MotorProgram::Script script;
   script.home = home;
-  if (hand.script == HandScript::kPush) {
-    // The rest comes first: a world that starts beside us is live before the first push.
-    script.strokes = {{home, hand.rest_ms * 1e-3},
-                      {reach, hand.reach_ms * 1e-3},
-                      {reach, hand.hold_ms * 1e-3},
-                      {home, hand.return_ms * 1e-3}};
-    script.repeats = true;
-    script.rest_jitter_s = hand.rest_jitter_ms * 1e-3;
-    script.seed = static_cast<std::uint64_t>(hand.seed);
+  script.seed = static_cast<std::uint64_t>(hand.seed);
+  // The rest comes first: a world that starts beside us is live before the first push.
+  switch (hand.script) {
+    case HandScript::kPush:
+      script.strokes = {{home, hand.rest_ms * 1e-3},
+                        {reach, hand.reach_ms * 1e-3},
+                        {reach, hand.hold_ms * 1e-3},
+                        {home, hand.return_ms * 1e-3}};
+      script.repeats = true;
+      script.rest_jitter_s = hand.rest_jitter_ms * 1e-3;
+      break;
+    case HandScript::kStir:
+      script.strokes = StirringStrokes(home, reach, hand.reach_ms * 1e-3, hand.hold_ms * 1e-3,
+                                       script.seed, kStirringStrokes);
+      script.strokes.insert(script.strokes.begin(), {home, hand.rest_ms * 1e-3});
+      script.repeats = true;
+      break;
+    case HandScript::kRest:
+      break;
   }
   return script;
 }
@@ -30,7 +42,7 @@ MotorProgram::Script PushScript(const HandSettings& hand) {
 }  // namespace
 
 Hand MakeHand(const Settings& settings) {
-  return {MotorProgram(PushScript(settings.hand)),
+  return {MotorProgram(ScriptOf(settings.hand)),
           {.mass_kg = settings.hand.mass_kg + settings.spidar.moving_mass_kg,
            .damping_ns_per_m =
                settings.hand.damping_ns_per_m + settings.spidar.friction_damping_ns_per_m,

@@ -54,6 +54,12 @@ class CoupledRun {
   /// From now on every frame is altered on its way to the haptic side.
   void AlterFrames(std::function<void(protocol::WorldFrame&)> alter) { alter_ = std::move(alter); }
 
+  /// Between two ticks another scene takes the place of the one that runs, as when its file changes.
+  void ReplaceScene(const world::Scene& scene, std::unique_ptr<world::DynamicsWorld> dynamics,
+                    world::Replacement how) {
+    world_.Replace(scene, std::move(dynamics), how);
+  }
+
   /// A silent world misses its ticks, shows no frame and no sign of life; afterwards it goes on
   /// where it stopped, and makes up for at most the gap of its settings.
   void SilenceWorld(bool silent) { world_is_silent_ = silent; }

@@ -11,6 +11,7 @@
 #include "tests/lab/buzz.h"
 #include "tests/lab/extremes.h"
 #include "tests/lab/fig6.h"
+#include "tests/lab/gallery.h"
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
 #include "tests/lab/pushes.h"
@@ -25,9 +26,8 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Buzz(),   Extremes(), Fig6(),      MultirateMasses(), MultirateGrowth(),
-          Planes(), Pushes(),   SceneCost(), Slides(),          Tensions(),
-          Wall()};
+  return {Buzz(),   Extremes(), Fig6(),      Gallery(), MultirateMasses(), MultirateGrowth(),
+          Planes(), Pushes(),   SceneCost(), Slides(),  Tensions(),        Wall()};
 }
 
 struct Options {

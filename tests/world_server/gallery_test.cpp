@@ -59,6 +59,7 @@ TEST_CASE("two seconds of each scene with a finger in it: finite, and slower tha
     // A thousand bodies fall asleep only after 2 s, which take 20.
     const int frames = large && std::getenv("RIKISEKI_FULL") == nullptr ? 2 : 40;
     Settings settings;
+    settings.features.radius_mm = 100;  // wherever things have rolled meanwhile
     WorldStep step(settings, scene, MakeDynamics(scene, 1e-3), 0);
     protocol::HapticTick tick;
     tick.tick = 1;

@@ -59,6 +59,7 @@ class Interrupted final : public DynamicsWorld {
   explicit Interrupted(std::function<void()>& interrupt) : interrupt_(interrupt) {}
   std::size_t body_count() const override { return 1; }
   BodyState State(std::size_t) const override { return {}; }
+  void SetState(std::size_t, const BodyState&) override {}
   void ApplyAndStep(std::span<const Kick>, double) override {
     if (interrupt_) interrupt_();
   }

@@ -45,7 +45,7 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
   std::stringstream text;
   text << file.rdbuf();
   CHECK(KeysOf(text.str(), true) == KeysOf(description, false));
-  CHECK(KeysOf(text.str(), true).size() == 9);
+  CHECK(KeysOf(text.str(), true).size() == 10);
 
   const Settings defaults;
   CHECK(shipped.loop.rate_hz == defaults.loop.rate_hz);
@@ -61,11 +61,13 @@ TEST_CASE("the shipped file documents every key, with the defaults of the code")
 
 TEST_CASE("every key reaches its setting") {
   const Settings settings = LoadSettings(
-      kShipped, {"loop.rate_hz=50", "scene.file=/a/b.sdf", "physics.substep_ms=2",
-                 "coupling.coupling=position", "coupling.replay=lump", "coupling.force_cap_n=7",
-                 "coupling.gap_ms=250", "features.radius_mm=33", "features.finger_friction=0.5"});
+      kShipped,
+      {"loop.rate_hz=50", "scene.file=/a/b.sdf", "scene.watch=false", "physics.substep_ms=2",
+       "coupling.coupling=position", "coupling.replay=lump", "coupling.force_cap_n=7",
+       "coupling.gap_ms=250", "features.radius_mm=33", "features.finger_friction=0.5"});
   CHECK(settings.period_ns() == 20'000'000);
   CHECK(settings.scene.file == "/a/b.sdf");
+  CHECK_FALSE(settings.scene.watch);
   CHECK(settings.physics.substep_ms == 2);
   CHECK(settings.coupling.coupling == protocol::Coupling::kPosition);
   CHECK(settings.coupling.replay == ReplayRule::kLump);

@@ -46,16 +46,29 @@ LedgerReader::LedgerReader(std::uint64_t own_epoch, protocol::Coupling coupling,
     : own_epoch_(own_epoch), coupling_(coupling), largest_impulse_ns_(largest_impulse_ns) {}
 
 void LedgerReader::SetBodies(std::vector<BodyTag> bodies) {
-  ImpulseUnits owed{};
-  for (const OwedUnits& body : owed_) owed = Plus(owed, body.impulse);
   const auto reason = static_cast<std::size_t>(DiscardReason::kUnknownBody);
-  life_books_.discarded[reason] = Plus(life_books_.discarded[reason], owed);
-  epoch_books_.discarded[reason] = Plus(epoch_books_.discarded[reason], Minus(owed, owed_before_));
-  owed_before_ = {};
+  const auto stays = [&](std::size_t body) {
+    return body < bodies.size() && bodies[body].movable && bodies_[body].movable &&
+           bodies[body].generation == bodies_[body].generation;
+  };
+  for (std::size_t body = 0; body < owed_.size(); ++body) {
+    if (stays(body)) continue;
+    const OwedUnits gone = std::exchange(owed_[body], {});
+    life_books_.discarded[reason] = Plus(life_books_.discarded[reason], gone.impulse);
+    epoch_books_.discarded[reason] =
+        Plus(epoch_books_.discarded[reason], Minus(gone.impulse, gone.impulse_before));
+  }
+  std::size_t kept = 0;
+  std::size_t i = 0;
+  for (ReplayTick& tick : replay_.ticks) {
+    for (; i < tick.end; ++i) {
+      if (stays(replay_.impulses[i].body)) replay_.impulses[kept++] = replay_.impulses[i];
+    }
+    tick.end = kept;
+  }
+  replay_.impulses.resize(kept);
   bodies_ = std::move(bodies);
-  owed_.assign(bodies_.size(), {});
-  for (ReplayTick& tick : replay_.ticks) tick.end = 0;
-  replay_.impulses.clear();
+  owed_.resize(bodies_.size());
 }
 
 void LedgerReader::BeginEpoch(std::uint64_t epoch) {
@@ -63,8 +76,7 @@ void LedgerReader::BeginEpoch(std::uint64_t epoch) {
   has_baseline_ = false;
   known_.clear();
   epoch_books_ = {};
-  owed_before_ = {};
-  for (const OwedUnits& body : owed_) owed_before_ = Plus(owed_before_, body.impulse);
+  for (OwedUnits& body : owed_) body.impulse_before = body.impulse;
 }
 
 void LedgerReader::Discard(const ImpulseUnits& impulse, DiscardReason reason) {
@@ -178,21 +190,21 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
 
 std::span<const PendingImpulse> LedgerReader::Take() {
   taken_.clear();
-  ImpulseUnits sum{};
+  ImpulseUnits sum{}, sum_before{};
   for (std::size_t body = 0; body < owed_.size(); ++body) {
-    OwedUnits& owed = owed_[body];
-    if (owed.impulse == ImpulseUnits{} && owed.angular_impulse == ImpulseUnits{}) continue;
+    const OwedUnits owed = std::exchange(owed_[body], {});
     sum = Plus(sum, owed.impulse);
-    taken_.push_back({.body = body,
+    sum_before = Plus(sum_before, owed.impulse_before);
+    if (owed.impulse == ImpulseUnits{} && owed.angular_impulse == ImpulseUnits{}) continue;
+    taken_.push_back({.body = bodies_[body].place,
                       .impulse = InSi(owed.impulse),
                       .angular_impulse = InSi(owed.angular_impulse)});
-    owed = {};
   }
   life_books_.applied = Plus(life_books_.applied, sum);
-  epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, owed_before_));
-  owed_before_ = {};
+  epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, sum_before));
   consumed_ns_ = consumed_nms_ = 0;
   std::swap(taken_replay_, replay_);
+  for (ReplayImpulse& push : taken_replay_.impulses) push.body = bodies_[push.body].place;
   replay_.ticks.clear();
   replay_.impulses.clear();
   return taken_;

@@ -17,22 +17,24 @@
 
 namespace rikiseki::world {
 
-/// Who a channel may push: the body's present generation, and whether it can move.
+/// Who a channel may push: the body's present generation, whether it can move, and where it stands
+/// in the scene.
 struct BodyTag {
-  std::uint32_t generation = 1;
+  std::uint32_t generation = 0;
   bool movable = false;
+  std::size_t place = 0;
 };
 
 /// What one body is owed, about the world origin, in W.
 struct PendingImpulse {
-  std::size_t body = 0;
+  std::size_t body = 0;                 // its place in the scene
   Vec3 impulse = Vec3::Zero();          // N s
   Vec3 angular_impulse = Vec3::Zero();  // N m s
 };
 
 /// What one body got within a ReplayTick, about the world origin, in W.
 struct ReplayImpulse {
-  std::size_t body = 0;
+  std::size_t body = 0;                 // its place in the scene
   Vec3 impulse = Vec3::Zero();          // N s
   Vec3 angular_impulse = Vec3::Zero();  // N m s
   // Only where messages were lost: the integral of what had arrived so far over the lost time, N s^2
@@ -69,7 +71,8 @@ class LedgerReader {
   /// whole.
   LedgerReader(std::uint64_t own_epoch, protocol::Coupling coupling, double largest_impulse_ns);
 
-  /// Names the bodies. What is pending for the ones before is discarded as kUnknownBody.
+  /// Says which bodies there are, by their number on the wire. What is pending for one that is no
+  /// longer what it was is discarded as kUnknownBody; for the others it stays.
   void SetBodies(std::vector<BodyTag> bodies);
 
   /// The next message is a baseline: nothing of it is owed. What is pending stays owed.
@@ -114,6 +117,7 @@ class LedgerReader {
   struct OwedUnits {
     protocol::ImpulseUnits impulse{};
     protocol::ImpulseUnits angular_impulse{};
+    protocol::ImpulseUnits impulse_before{};  // of it, from epochs before this one
   };
 
   /// Growth of every channel since the message before, which this one replaces.
@@ -131,13 +135,13 @@ class LedgerReader {
   std::uint64_t last_start_ns_ = 0;
   std::vector<KnownChannel> known_;  // of the last message
 
-  std::vector<BodyTag> bodies_;
-  std::vector<OwedUnits> owed_;           // by body
-  protocol::ImpulseUnits owed_before_{};  // of it, from epochs before this one
-  double consumed_ns_ = 0;                // sum of |q| over this world tick
-  double consumed_nms_ = 0;               // of the angular ones
+  std::vector<BodyTag> bodies_;  // by number, as are all below
+  std::vector<OwedUnits> owed_;
+  double consumed_ns_ = 0;   // sum of |q| over this world tick
+  double consumed_nms_ = 0;  // of the angular ones
   std::vector<PendingImpulse> taken_;
-  Replay replay_, taken_replay_;
+  Replay replay_;        // by number
+  Replay taken_replay_;  // by place
 
   LedgerBooks epoch_books_;
   LedgerBooks life_books_;

@@ -5,8 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "world_server/coupling/kick.h"
-
 namespace rikiseki::world {
 namespace {
 
@@ -30,20 +28,18 @@ Vec3 ProfileShare(const Vec3& total, const Vec3& moment, double block_s, int i, 
   return mean + slope * (i - half);
 }
 
-class Player {
+// The stretches of a period, put together tick by tick.
+class Schedule {
  public:
-  Player(DynamicsWorld& world, double largest_impulse_ns)
-      : world_(world), largest_impulse_ns_(largest_impulse_ns) {}
+  explicit Schedule(double largest_impulse_ns) : largest_impulse_ns_(largest_impulse_ns) {}
 
   void Wait(double time_s) { waiting_s_ += time_s; }
 
-  void Play(std::span<const ReplayImpulse> impulses, const ReplayTick& tick, double length_s) {
+  void Add(std::span<const ReplayImpulse> impulses, const ReplayTick& tick, double length_s) {
     if (impulses.empty()) return Wait(length_s);
     const int blocks = static_cast<int>(
         std::min(static_cast<double>(tick.ticks), 1 + std::ceil(length_s / kShortestBlock)));
     for (int i = 0; i < blocks; ++i) {
-      Catch();
-      kicks_.clear();
       for (const ReplayImpulse& push : impulses) {
         Vec3 impulse = push.impulse;
         Vec3 angular_impulse = push.angular_impulse;
@@ -54,24 +50,44 @@ class Player {
           angular_impulse = ProfileShare(push.angular_impulse, push.angular_first_moment, block_s,
                                          i, blocks, largest_impulse_ns_);
         }
-        kicks_.push_back(
-            KickAtCentre(push.body, impulse, angular_impulse, world_.State(push.body)));
+        pushes_.push_back(
+            {.body = push.body, .impulse = impulse, .angular_impulse = angular_impulse});
       }
-      world_.ApplyAndStep(kicks_, length_s / blocks);
+      Close(length_s / blocks, impulses.size());
     }
   }
 
-  /// Lets pass what was waited for, in one go.
-  void Catch() {
-    if (waiting_s_ > 0) world_.ApplyAndStep({}, waiting_s_);
-    waiting_s_ = 0;
+  void Play(DynamicsWorld& world) {
+    LetPass();
+    const std::span<const PlacedImpulse> all(pushes_);
+    std::size_t begin = 0;
+    for (std::size_t i = 0; i < stretches_.size(); ++i) {
+      stretches_[i].pushes = all.subspan(begin, counts_[i]);
+      begin += counts_[i];
+    }
+    world.Play(stretches_);
   }
 
  private:
-  DynamicsWorld& world_;
+  void Close(double length_s, std::size_t pushes) {
+    LetPass();
+    stretches_.push_back({.length_s = length_s});
+    counts_.push_back(pushes);
+  }
+
+  // What was waited for passes in one stretch, before the next push.
+  void LetPass() {
+    if (!(waiting_s_ > 0)) return;
+    stretches_.push_back({.length_s = waiting_s_});
+    counts_.push_back(0);
+    waiting_s_ = 0;
+  }
+
   double largest_impulse_ns_;
   double waiting_s_ = 0;
-  std::vector<Kick> kicks_;
+  std::vector<PlacedImpulse> pushes_;
+  std::vector<std::size_t> counts_;  // of pushes, by stretch
+  std::vector<Stretch> stretches_;
 };
 
 }  // namespace
@@ -81,20 +97,20 @@ void ReplayPush(const Replay& replay, double period_s, double largest_impulse_ns
   double covered_s = 0;
   for (const ReplayTick& tick : replay.ticks) covered_s += tick.length_s;
   double scale = 1;
-  Player player(world, largest_impulse_ns);
+  Schedule schedule(largest_impulse_ns);
   const double missing_s = period_s - covered_s;
   if (missing_s > kSameTime * period_s) {
-    player.Wait(missing_s);
+    schedule.Wait(missing_s);
   } else if (-missing_s > kSameTime * period_s) {
     scale = covered_s > 0 ? period_s / covered_s : 1;
   }
   std::size_t begin = 0;
   for (const ReplayTick& tick : replay.ticks) {
     const std::span<const ReplayImpulse> all(replay.impulses);
-    player.Play(all.subspan(begin, tick.end - begin), tick, scale * tick.length_s);
+    schedule.Add(all.subspan(begin, tick.end - begin), tick, scale * tick.length_s);
     begin = tick.end;
   }
-  player.Catch();
+  schedule.Play(world);
 }
 
 }  // namespace rikiseki::world

@@ -7,8 +7,8 @@
 
 namespace rikiseki::world {
 
-/// Advances the world by `period_s`: every tick's impulses as kicks at each body's present centre,
-/// then the length of the tick. Where messages were lost, their sum enters in as many blocks as
+/// Advances the world by `period_s`: every tick's impulses as pushes, then the length of the
+/// tick; all of it is one DynamicsWorld::Play. Where messages were lost, their sum enters in as many blocks as
 /// ticks were lost, in a linear profile that has the same impulse and the same first moment. What
 /// the ticks do not cover passes before them; where they cover more, they are shortened alike.
 /// `largest_impulse_ns` bounds what a first moment may say.

@@ -70,6 +70,18 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
   return fingers;
 }
 
+void PlaneFinder::Continue(const PlaneFinder& before, std::span<const BodyChange> changes) {
+  std::map<std::size_t, std::size_t> now;  // by the place before
+  for (std::size_t body = 0; body < changes.size(); ++body) {
+    if (changes[body].same) now.emplace(*changes[body].before, body);
+  }
+  for (const auto& [key, track] : before.tracks_) {
+    const auto [pointer, body, place] = key;
+    const auto same = now.find(body);
+    if (same != now.end()) tracks_.emplace(TrackKey{pointer, same->second, place}, track);
+  }
+}
+
 std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                                 std::span<const std::uint32_t> generations,
                                 std::span<const Finger> fingers, const FeatureReach& reach,

@@ -14,6 +14,7 @@
 #include "world_server/features/near_bodies.h"
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/scene/scene.h"
+#include "world_server/scene/scene_change.h"
 
 namespace rikiseki::world {
 
@@ -54,6 +55,9 @@ class PlaneFinder {
   /// `scene` outlives this, and so do the dynamics, which know the surfaces of its soft bodies.
   explicit PlaneFinder(const Scene& scene, const DynamicsWorld* dynamics = nullptr)
       : scene_(scene), dynamics_(dynamics), near_(scene) {}
+
+  /// Goes on with what `before` knows of the features of bodies that are the same.
+  void Continue(const PlaneFinder& before, std::span<const BodyChange> changes);
 
   /// Fills `planes` nearest first, at most its length, and returns how many. Friction of finger and
   /// surface combines as sqrt(mu1 mu2), the static one with the finger's dynamic one likewise.

@@ -218,4 +218,14 @@ double TriangleMesh::Volume() const {
   return six_volumes / 6;
 }
 
+bool SameTriangles(const TriangleMesh* a, const TriangleMesh* b) {
+  if (a == b) return true;
+  if (a == nullptr || b == nullptr) return false;
+  return a->corners() == b->corners() &&
+         std::equal(a->faces().begin(), a->faces().end(), b->faces().begin(), b->faces().end(),
+                    [](const TriangleMesh::Face& first, const TriangleMesh::Face& second) {
+                      return first.corners == second.corners;
+                    });
+}
+
 }  // namespace rikiseki::world

@@ -93,4 +93,7 @@ class TriangleMesh {
   double radius_ = 0;
 };
 
+/// Whether two meshes have the same corners and triangles in the same order; either may be null.
+bool SameTriangles(const TriangleMesh* a, const TriangleMesh* b);
+
 }  // namespace rikiseki::world

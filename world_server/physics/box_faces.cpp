@@ -60,6 +60,14 @@ Polygon ClipToFace(Polygon polygon, const PlacedBox& box, int axis) {
   return polygon;
 }
 
+Polygon ClipToBorder(Polygon polygon, const Polygon& border, const Vec3& normal) {
+  for (std::size_t i = 0; i < border.size(); ++i) {
+    const Vec3 out = (border[(i + 1) % border.size()] - border[i]).cross(normal);
+    polygon = Clip(polygon, out, out.dot(border[i]));
+  }
+  return polygon;
+}
+
 Vec3 NearestOnSegment(const Vec3& p, const Vec3& along, double half, const Vec3& q,
                       const Vec3& other) {
   const double cosine = along.dot(other);

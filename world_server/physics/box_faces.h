@@ -39,6 +39,9 @@ Polygon Clip(const Polygon& polygon, const Vec3& normal, double offset);
 /// What of the polygon lies over the box's two faces along `axis`.
 Polygon ClipToFace(Polygon polygon, const PlacedBox& box, int axis);
 
+/// What of the polygon lies over a convex face: its border is counter-clockwise about `normal`.
+Polygon ClipToBorder(Polygon polygon, const Polygon& border, const Vec3& normal);
+
 /// The place on the line p + t along, |t| <= half, that is nearest to the line through q along
 /// `other`. Unit directions that are not parallel.
 Vec3 NearestOnSegment(const Vec3& p, const Vec3& along, double half, const Vec3& q,

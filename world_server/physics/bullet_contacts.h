@@ -1,5 +1,4 @@
-// The pairs of shapes whose contacts are ours (pair_contact.h) and not Bullet's: boxes, cylinders and
-// hulls on half-spaces and on boxes.
+// Contacts are ours (shape_contact.h) and not Bullet's, for every pair of shapes.
 #pragma once
 
 #include <vector>
@@ -8,7 +7,7 @@
 
 namespace rikiseki::world {
 
-/// To be kept as long as the dispatcher is used.
+/// To be kept as long as the dispatcher is used. The shapes are of MakeBulletShape.
 std::vector<PairContact> ReplaceContacts(btCollisionDispatcher& dispatcher);
 
 }  // namespace rikiseki::world

@@ -35,58 +35,55 @@ bool KeepsPoints(const btPersistentManifold& manifold) {
 
 }  // namespace
 
-void DropStaleContacts(btDiscreteDynamicsWorld& world, double step_s) {
-  btDispatcher& dispatcher = *world.getDispatcher();
-  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-    btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    if (!KeepsPoints(manifold)) continue;
-    for (int j = 0; j < manifold.getNumContacts(); ++j) {
-      if (Slip(manifold, manifold.getContactPoint(j)).norm() * step_s > kStale) {
-        manifold.clearManifold();
+void DropStaleContacts(std::span<btPersistentManifold* const> manifolds, double step_s) {
+  for (btPersistentManifold* manifold : manifolds) {
+    if (!KeepsPoints(*manifold)) continue;
+    for (int j = 0; j < manifold->getNumContacts(); ++j) {
+      if (Slip(*manifold, manifold->getContactPoint(j)).norm() * step_s > kStale) {
+        manifold->clearManifold();
       }
     }
   }
 }
 
-void BeginSubstep(std::vector<HookedBody>& bodies) {
-  for (HookedBody& body : bodies) {
+void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> stepped) {
+  for (const std::size_t place : stepped) {
+    MovingBody& body = moving[place];
     body.velocity = FromBullet(body.rigid->getLinearVelocity());
     body.angular_velocity = FromBullet(body.rigid->getAngularVelocity());
     body.orientation = FromBullet(body.rigid->getWorldTransform().getRotation());
+    body.pushing = {};
   }
 }
 
-void EndSubstep(btDiscreteDynamicsWorld& world, std::vector<HookedBody>& bodies, double step_s) {
-  std::vector<PushingContacts> pushing(bodies.size());
-  btDispatcher& dispatcher = *world.getDispatcher();
-  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    for (int j = 0; j < manifold.getNumContacts(); ++j) {
-      const btManifoldPoint& point = manifold.getContactPoint(j);
+void EndSubstep(std::span<btPersistentManifold* const> manifolds, std::vector<MovingBody>& moving,
+                std::span<const std::size_t> stepped, double step_s, bool precess) {
+  for (const btPersistentManifold* manifold : manifolds) {
+    for (int j = 0; j < manifold->getNumContacts(); ++j) {
+      const btManifoldPoint& point = manifold->getContactPoint(j);
       if (!(point.m_appliedImpulse > 0)) continue;
-      const double slip = Slip(manifold, point).norm();
-      for (const btCollisionObject* object : {manifold.getBody0(), manifold.getBody1()}) {
+      const double slip = Slip(*manifold, point).norm();
+      for (const btCollisionObject* object : {manifold->getBody0(), manifold->getBody1()}) {
         const int index = object->getUserIndex();
         if (index < 0) continue;
-        pushing[static_cast<std::size_t>(index)].Add(FromBullet(point.m_normalWorldOnB), slip);
+        moving[static_cast<std::size_t>(index)].pushing.Add(FromBullet(point.m_normalWorldOnB),
+                                                            slip);
       }
     }
   }
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    HookedBody& body = bodies[i];
-    if (!body.rigid->isActive()) continue;
+  for (const std::size_t place : stepped) {
+    MovingBody& body = moving[place];
     const Vec3 change = FromBullet(body.rigid->getLinearVelocity()) - body.velocity;
     btTransform pose = body.rigid->getWorldTransform();
-    pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * pushing[i].HalfAct(change)));
-    if (!body.inertia.isotropic) {
+    pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * body.pushing.HalfAct(change)));
+    if (precess && !body.inertia.isotropic) {
       BodyState state{.pose = {.orientation = body.orientation},
                       .angular_velocity = FromBullet(body.rigid->getAngularVelocity())};
       AdvanceRotation(body.inertia, step_s, state);
       pose.setRotation(ToBullet(state.pose.orientation));
       body.rigid->setAngularVelocity(ToBullet(state.angular_velocity));
     }
-    body.rigid->setWorldTransform(pose);
-    body.rigid->setInterpolationWorldTransform(pose);
+    body.rigid->setCenterOfMassTransform(pose);
   }
 }
 

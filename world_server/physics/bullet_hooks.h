@@ -6,36 +6,28 @@
 // mm, energy of a tumbling plate -71 % -> 2e-7.
 #pragma once
 
+#include <cstddef>
+#include <span>
 #include <vector>
 
-#include "common/rigid_body.h"
+#include "world_server/physics/bullet_bodies.h"
 
-class btDiscreteDynamicsWorld;
-class btRigidBody;
+class btPersistentManifold;
 
 namespace rikiseki::world {
 
-/// A moving body of the engine. Its frame is Bullet's: the principal axes of inertia.
-struct HookedBody {
-  btRigidBody* rigid = nullptr;
-  BodyInertia inertia;
-
-  // At the start of the substep, the kick included.
-  Vec3 velocity = Vec3::Zero();
-  Vec3 angular_velocity = Vec3::Zero();
-  Quat orientation = Quat::Identity();
-};
-
 /// Forgets contacts of pairs that slide by more than 10 um in a substep, where Bullet keeps points
-/// from substep to substep: they lag behind. Before the substep. Half-space pairs find all their
-/// points anew anyway, spheres have only one.
-void DropStaleContacts(btDiscreteDynamicsWorld& world, double step_s);
+/// from substep to substep: they lag behind. Before the contacts are found anew. Half-space pairs find
+/// all their points anew anyway, spheres have only one.
+void DropStaleContacts(std::span<btPersistentManifold* const> manifolds, double step_s);
 
-/// Remembers velocities and attitudes. After the kicks, before the substep.
-void BeginSubstep(std::vector<HookedBody>& bodies);
+/// Remembers velocities and attitudes of the stepped bodies, places in `moving`. After the kicks, before
+/// the solver.
+void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> stepped);
 
-/// Corrects positions and attitudes. After the substep. Every rigid body's user index is its place
-/// in `bodies`, or -1.
-void EndSubstep(btDiscreteDynamicsWorld& world, std::vector<HookedBody>& bodies, double step_s);
+/// Corrects positions and, where `precess` says so, attitudes. After the solver's velocities were made
+/// to poses. `manifolds` are those of the stepped bodies.
+void EndSubstep(std::span<btPersistentManifold* const> manifolds, std::vector<MovingBody>& moving,
+                std::span<const std::size_t> stepped, double step_s, bool precess);
 
 }  // namespace rikiseki::world

@@ -1,7 +1,5 @@
 #include "world_server/physics/bullet_rebound.h"
 
-#include <btBulletDynamicsCommon.h>
-
 #include <algorithm>
 
 #include "world_server/physics/bullet_math.h"
@@ -26,26 +24,25 @@ struct Bounce {
 };
 
 // Of the body's material at the start of the substep.
-btVector3 SpeedBefore(const btRigidBody& rigid, const std::vector<HookedBody>& bodies,
-                      const btVector3& arm) {
+btVector3 SpeedBefore(const btRigidBody& rigid, const BulletBodies& bodies, const btVector3& arm) {
   if (rigid.getUserIndex() < 0) return btVector3(0, 0, 0);
-  const HookedBody& body = bodies[static_cast<std::size_t>(rigid.getUserIndex())];
+  const MovingBody& body = bodies.moving[static_cast<std::size_t>(rigid.getUserIndex())];
   return ToBullet(body.velocity) + ToBullet(body.angular_velocity).cross(arm);
 }
 
 }  // namespace
 
-void Rebound(btDiscreteDynamicsWorld& world, const std::vector<HookedBody>& bodies,
-             const std::vector<double>& restitutions, double step_s) {
-  const btScalar slowest = std::max(kSlowestBounce, 2 * world.getGravity().length() * step_s);
+void Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodies& bodies,
+             double gravity, double step_s) {
+  const btScalar slowest = std::max(kSlowestBounce, 2 * gravity * step_s);
   std::vector<Bounce> bounces;
-  btDispatcher& dispatcher = *world.getDispatcher();
-  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
+  for (const btPersistentManifold* each : manifolds) {
+    const btPersistentManifold& manifold = *each;
     auto* first = const_cast<btRigidBody*>(btRigidBody::upcast(manifold.getBody0()));
     auto* second = const_cast<btRigidBody*>(btRigidBody::upcast(manifold.getBody1()));
-    const btScalar restitution = restitutions[static_cast<std::size_t>(first->getUserIndex3())] *
-                                 restitutions[static_cast<std::size_t>(second->getUserIndex3())];
+    const btScalar restitution =
+        bodies.restitutions[static_cast<std::size_t>(first->getUserIndex3())] *
+        bodies.restitutions[static_cast<std::size_t>(second->getUserIndex3())];
     if (!(restitution > 0)) continue;
     for (int j = 0; j < manifold.getNumContacts(); ++j) {
       const btManifoldPoint& point = manifold.getContactPoint(j);

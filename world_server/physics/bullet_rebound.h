@@ -3,18 +3,18 @@
 // loses the more energy the smaller the step is.
 #pragma once
 
-#include <vector>
+#include <span>
 
-#include "world_server/physics/bullet_hooks.h"
+#include "world_server/physics/bullet_bodies.h"
 
 namespace rikiseki::world {
 
 /// What closes more slowly does not bounce; and nothing that falls for two substeps only.
 inline constexpr double kSlowestBounce = 0.02;  // m/s
 
-/// Gives the rebound of the substep that has just ended to the velocities. `restitutions` is by the
-/// third user index of the rigid bodies; two combine as their product.
-void Rebound(btDiscreteDynamicsWorld& world, const std::vector<HookedBody>& bodies,
-             const std::vector<double>& restitutions, double step_s);
+/// Gives the rebound of the substep that has just ended to the velocities. Two surfaces' restitutions
+/// combine as their product. `gravity` in m/s^2.
+void Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodies& bodies,
+             double gravity, double step_s);
 
 }  // namespace rikiseki::world

@@ -13,7 +13,7 @@ namespace {
 // Bullet's distance queries away from its penetration solver when surfaces just touch.
 constexpr btScalar kMargin = 1e-6;
 
-class EllipsoidShape final : public btConvexInternalShape {
+class EllipsoidShape : public btConvexInternalShape {
  public:
   explicit EllipsoidShape(const Vec3& radii) : radii_(ToBullet(radii)) {
     m_shapeType = CUSTOM_CONVEX_SHAPE_TYPE;
@@ -68,7 +68,7 @@ struct MeshData {
   }
 };
 
-class MeshShape final : private MeshData, public btBvhTriangleMeshShape {
+class MeshShape : private MeshData, public btBvhTriangleMeshShape {
  public:
   explicit MeshShape(const TriangleMesh& mesh)
       : MeshData(mesh), btBvhTriangleMeshShape(&view, /*useQuantizedAabbCompression=*/true) {
@@ -76,49 +76,58 @@ class MeshShape final : private MeshData, public btBvhTriangleMeshShape {
   }
 };
 
-class HullShape final : public btConvexHullShape {
+// A shape of Bullet's that knows which shape of ours it stands for.
+template <typename BulletShape>
+class Standing final : public BulletShape {
  public:
-  explicit HullShape(const TriangleMesh& hull) : faces_(hull) {
-    for (const Vec3& corner : hull.corners()) addPoint(ToBullet(corner), false);
-    recalcLocalAabb();
+  template <typename... Arguments>
+  explicit Standing(const Shape& shape, const Arguments&... arguments)
+      : BulletShape(arguments...), solid_(shape) {
+    this->setUserPointer(&solid_);
   }
-  const Polyhedron& faces() const { return faces_; }
 
  private:
-  Polyhedron faces_;
+  Solid solid_;
 };
 
-std::unique_ptr<btCollisionShape> Make(const Box& box) {
-  return std::make_unique<btBoxShape>(ToBullet(box.half_extents));
-}
-std::unique_ptr<btCollisionShape> Make(const Sphere& sphere) {
-  return std::make_unique<btSphereShape>(sphere.radius);
-}
-std::unique_ptr<btCollisionShape> Make(const HalfSpace& half_space) {
-  return std::make_unique<btStaticPlaneShape>(ToBullet(half_space.normal), 0);
-}
-std::unique_ptr<btCollisionShape> Make(const Cylinder& cylinder) {
-  return std::make_unique<btCylinderShapeZ>(
-      btVector3(cylinder.radius, cylinder.radius, cylinder.half_length));
-}
-std::unique_ptr<btCollisionShape> Make(const Capsule& capsule) {
-  return std::make_unique<btCapsuleShapeZ>(capsule.radius, 2 * capsule.half_length);
-}
-std::unique_ptr<btCollisionShape> Make(const Ellipsoid& ellipsoid) {
-  return std::make_unique<EllipsoidShape>(ellipsoid.radii);
+template <typename BulletShape, typename... Arguments>
+std::unique_ptr<btCollisionShape> Stand(const Shape& shape, const Arguments&... arguments) {
+  return std::make_unique<Standing<BulletShape>>(shape, arguments...);
 }
 
-std::unique_ptr<btCollisionShape> Make(const Hull& hull) {
-  return std::make_unique<HullShape>(*hull.mesh);
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Box& box) {
+  return Stand<btBoxShape>(shape, ToBullet(box.half_extents));
 }
-std::unique_ptr<btCollisionShape> Make(const Mesh& mesh) {
-  return std::make_unique<MeshShape>(*mesh.mesh);
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Sphere& sphere) {
+  return Stand<btSphereShape>(shape, sphere.radius);
+}
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const HalfSpace& half_space) {
+  return Stand<btStaticPlaneShape>(shape, ToBullet(half_space.normal), btScalar(0));
+}
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Cylinder& cylinder) {
+  return Stand<btCylinderShapeZ>(shape,
+                                 btVector3(cylinder.radius, cylinder.radius, cylinder.half_length));
+}
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Capsule& capsule) {
+  return Stand<btCapsuleShapeZ>(shape, capsule.radius, 2 * capsule.half_length);
+}
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Ellipsoid& ellipsoid) {
+  return Stand<EllipsoidShape>(shape, ellipsoid.radii);
+}
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Hull& hull) {
+  auto made = std::make_unique<Standing<btConvexHullShape>>(shape);
+  for (const Vec3& corner : hull.mesh->corners()) made->addPoint(ToBullet(corner), false);
+  made->recalcLocalAabb();
+  return made;
+}
+std::unique_ptr<btCollisionShape> Make(const Shape& shape, const Mesh& mesh) {
+  return Stand<MeshShape>(shape, *mesh.mesh);
 }
 
 }  // namespace
 
 std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape) {
-  auto made = std::visit([](const auto& given) { return Make(given); }, shape);
+  auto made = std::visit([&](const auto& given) { return Make(shape, given); }, shape);
   // The margin of a sphere or capsule is its radius, an ellipsoid and a mesh have none.
   if (made->getShapeType() == BOX_SHAPE_PROXYTYPE ||
       made->getShapeType() == CYLINDER_SHAPE_PROXYTYPE ||
@@ -128,8 +137,8 @@ std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape) {
   return made;
 }
 
-const Polyhedron& FacesOf(const btConvexHullShape& hull) {
-  return static_cast<const HullShape&>(hull).faces();
+const Solid& SolidOf(const btCollisionShape& made) {
+  return *static_cast<const Solid*>(made.getUserPointer());
 }
 
 }  // namespace rikiseki::world

@@ -6,10 +6,7 @@
 
 #include <memory>
 
-#include "world_server/geometry/polyhedron.h"
-#include "world_server/scene/scene.h"
-
-class btConvexHullShape;
+#include "world_server/physics/solid.h"
 
 namespace rikiseki::world {
 
@@ -17,7 +14,7 @@ namespace rikiseki::world {
 /// cannot move. Holds all that it needs of `shape`.
 std::unique_ptr<btCollisionShape> MakeBulletShape(const Shape& shape);
 
-/// Of a hull that was made here.
-const Polyhedron& FacesOf(const btConvexHullShape& hull);
+/// What a shape that was made here stands for, exactly.
+const Solid& SolidOf(const btCollisionShape& made);
 
 }  // namespace rikiseki::world

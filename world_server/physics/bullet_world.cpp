@@ -1,282 +1,221 @@
 #include "world_server/physics/bullet_world.h"
 
-#include <btBulletDynamicsCommon.h>
-
-#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <vector>
 
 #include "common/body_step.h"
-#include "world_server/physics/air.h"
+#include "world_server/physics/bullet_bodies.h"
 #include "world_server/physics/bullet_contacts.h"
-#include "world_server/physics/bullet_hooks.h"
-#include "world_server/physics/bullet_math.h"
-#include "world_server/physics/bullet_rebound.h"
-#include "world_server/physics/bullet_shapes.h"
-#include "world_server/physics/contact_sites.h"
-#include "world_server/scene/shape_size.h"
+#include "world_server/physics/contact_impulses.h"
+#include "world_server/physics/contact_pairs.h"
+#include "world_server/physics/group_substep.h"
+#include "world_server/physics/islands.h"
+#include "world_server/physics/sleep.h"
+#include "world_server/physics/substep_choice.h"
 
 namespace rikiseki::world {
 namespace {
 
-// Principal moments, and the axes they are about: x_B = orientation * x_principal.
-struct PrincipalInertia {
-  Vec3 moments = Vec3::Zero();
-  Quat orientation = Quat::Identity();
+// Groups are worked out anew so often: longer, and slow bodies far from each other become one group;
+// shorter, and finding groups costs more than stepping.
+constexpr double kWindow = 0.01;  // s
+// A window of ticks that are a little too long by rounding is still one window.
+constexpr double kSameTime = 1e-9;  // relative
+
+// Tells Bullet's sweeps which pairs have contacts already.
+class KnownPairs final : public btNullPairCache {
+ public:
+  explicit KnownPairs(const ContactPairs& pairs) : pairs_(pairs) {}
+
+  btBroadphasePair* findPair(btBroadphaseProxy* a, btBroadphaseProxy* b) override {
+    const ContactPair* pair = pairs_.Find(*static_cast<btCollisionObject*>(a->m_clientObject),
+                                          *static_cast<btCollisionObject*>(b->m_clientObject));
+    if (pair == nullptr) return nullptr;
+    found_.m_algorithm = pair->algorithm;
+    return &found_;
+  }
+
+ private:
+  const ContactPairs& pairs_;
+  btBroadphasePair found_;
 };
 
-PrincipalInertia Diagonalize(const Mat3& inertia) {
-  const double off_diagonal =
-      std::max({std::abs(inertia(0, 1)), std::abs(inertia(0, 2)), std::abs(inertia(1, 2))});
-  if (off_diagonal <= 1e-14 * inertia.diagonal().maxCoeff()) return {.moments = inertia.diagonal()};
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(inertia);
-  Mat3 axes = solver.eigenvectors();
-  if (axes.determinant() < 0) axes.col(2) *= -1;
-  return {.moments = solver.eigenvalues(), .orientation = Quat(axes).normalized()};
-}
+// A part of a window in which what a push reaches is stepped, and the pushes at its start.
+struct FineStep {
+  double length_s = 0;
+  std::span<const PlacedImpulse> pushes;
+};
 
 }  // namespace
 
 struct BulletWorld::Engine {
-  static constexpr std::size_t kFixed = static_cast<std::size_t>(-1);
-
-  struct Body {
-    std::size_t moving = kFixed;   // its place in `moving`
-    Quat q_BP = Quat::Identity();  // principal axes in the body's frame
-  };
-  struct Drag {
-    std::size_t moving = 0;
-    AirDrag air;
-  };
-
   // Members are destroyed from the last to the first: the world before what it points to.
+  EngineParts parts;
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher{&configuration};
   std::vector<PairContact> contacts = ReplaceContacts(dispatcher);
-  btDbvtBroadphase broadphase;
-  btSequentialImpulseConstraintSolver solver;
-  std::vector<std::unique_ptr<btCollisionShape>> shapes;
-  std::vector<std::unique_ptr<btRigidBody>> rigid_bodies;
-  btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
-  std::vector<Body> bodies;  // in the scene's order
-  std::vector<HookedBody> moving;
-  std::vector<Drag> drags;           // of the bodies on which the air acts
-  std::vector<double> restitutions;  // of rigid_bodies
-  bool bounces = false;              // whether any of them is above 0
-  double resting_depth = 0;          // m, how deep bodies rest in each other
+  BulletBodies bodies;
+  ContactPairs pairs{dispatcher, bodies.moving.size()};
+  KnownPairs known_pairs{pairs};
+  btDbvtBroadphase broadphase{&known_pairs};
+  std::unique_ptr<btSequentialImpulseConstraintSolver> solver = MakeSolver(parts);
+  double resting_depth;  // m, how deep bodies rest in each other
+  Sleepers sleepers;
+  GroupedWorld world;
+  Islands islands{bodies, pairs, sleepers, broadphase, world, parts.contacts};
 
-  explicit Engine(const Scene& scene);
-  ~Engine() {
-    for (const auto& rigid : rigid_bodies) world.removeRigidBody(rigid.get());
+  std::vector<char> pushed;          // of each moving body: in this window
+  std::vector<double> pushed_speed;  // m/s, that it may add
+  std::vector<std::size_t> all_pushed;
+  std::vector<FineStep> fine_steps;
+  std::vector<std::size_t> moved;  // since the states were read
+  std::uint64_t substeps = 0;
+
+  Engine(const Scene& scene, const EngineParts& given)
+      : parts(given),
+        bodies(scene),
+        resting_depth(1e-4 * bodies.smallest),
+        sleepers(bodies.moving, parts.sleeping),
+        world(dispatcher, broadphase, *solver, configuration, bodies, pairs, sleepers, parts,
+              resting_depth),
+        pushed(bodies.moving.size()),
+        pushed_speed(bodies.moving.size()) {
+    broadphase.m_deferedcollide = true;  // never asked for pairs: islands.h asks by itself
+    broadphase.optimize();
   }
 
-  void AddFixed(const SceneBody& body);
-  void AddMoving(const SceneBody& body);
-  btRigidBody* Add(double mass, const Vec3& moments, btCollisionShape* shape,
-                   const Collider& surface, const Pose& pose);
+  void Mark(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse);
   void Apply(const Kick& kick);
-  void Substep(double step_s);
-  BodyState State(const Body& body) const;
-  void AddImpulses(std::size_t body, std::span<const BodyState> states,
-                   std::span<ContactSite> sites);
+  void Apply(const PlacedImpulse& push);
+  void Advance(std::span<const Stretch> stretches, double substep_s, bool long_substeps);
+  void PassWindow(std::span<const FineStep> steps, double window_s, double substep_s,
+                  bool long_substeps);
+  void StepGroup(const Group& group, std::size_t place, std::span<const FineStep> steps,
+                 double window_s, double substep_s, bool long_substeps);
+  void Step(const Group& group, double length_s, double longest_s);
 };
 
-BulletWorld::Engine::Engine(const Scene& scene) {
-  double smallest = std::numeric_limits<double>::infinity();
-  for (const SceneBody& body : scene.bodies) {
-    if (body.fixed) continue;
-    for (const Collider& collider : body.colliders) {
-      smallest = std::min(smallest, 2 * OuterBall(collider.shape).radius);
-    }
-  }
-
-  world.setGravity(ToBullet(scene.gravity));
-  btContactSolverInfo& info = world.getSolverInfo();
-  info.m_numIterations = 50;
-  info.m_leastSquaresResidualThreshold = 0;  // always all iterations: no early end, same bits
-  info.m_splitImpulse = 1;                   // penetration is mended without giving velocity
-  info.m_splitImpulsePenetrationThreshold = -kDeepPenetration;
-  info.m_erp2 = kPenetrationRecovery;
-  resting_depth = 1e-4 * smallest;
-  info.m_linearSlop = resting_depth;
-  // With two directions friction is a box in velocity space, 20 % and 45 degrees wrong at any step;
-  // with one, Bullet takes the direction of slip.
-  info.m_solverMode &= ~SOLVER_USE_2_FRICTION_DIRECTIONS;
-  world.getDispatchInfo().m_allowedCcdPenetration = 1e-5;
-
-  for (const SceneBody& body : scene.bodies) {
-    body.fixed ? AddFixed(body) : AddMoving(body);
-  }
+// A push is on its way, or has come: its body wakes.
+void BulletWorld::Engine::Mark(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse) {
+  if (impulse.isZero(0) && angular_impulse.isZero(0)) return;
+  sleepers.Wake(body);
+  if (pushed[body] == 0) all_pushed.push_back(body);
+  pushed[body] = 1;
+  const MovingBody& moving = bodies.moving[body];
+  pushed_speed[body] +=
+      impulse.norm() / moving.inertia.mass_kg +
+      moving.outer_radius * moving.inertia.inverse_B.diagonal().maxCoeff() * angular_impulse.norm();
 }
 
-void BulletWorld::Engine::AddFixed(const SceneBody& body) {
-  // One object for each shape: a half-space cannot be part of a compound, and each keeps its
-  // friction.
-  for (const Collider& collider : body.colliders) {
-    shapes.push_back(MakeBulletShape(collider.shape));
-    Add(0, Vec3::Zero(), shapes.back().get(), collider, body.pose_WB * collider.pose_BS);
-  }
-  bodies.emplace_back();
-}
-
-void BulletWorld::Engine::AddMoving(const SceneBody& body) {
-  const auto refuse = [&](const std::string& why) {
-    throw std::invalid_argument("body " + body.name + ": " + why);
-  };
-  const PrincipalInertia inertia = Diagonalize(body.inertia);
-  if (!(body.mass_kg > 0)) refuse("a moving body needs a mass");
-  if (!(inertia.moments.minCoeff() > 0)) refuse("a moving body needs a positive inertia");
-  if (body.colliders.empty()) refuse("a moving body needs a shape");
-
-  double inner = 0;
-  auto compound = std::make_unique<btCompoundShape>();
-  const Pose pose_PB = Pose{.orientation = inertia.orientation}.Inverse();
-  for (const Collider& collider : body.colliders) {
-    if (std::holds_alternative<HalfSpace>(collider.shape)) refuse("a half-space cannot move");
-    if (std::holds_alternative<Mesh>(collider.shape)) refuse("a mesh that is no hull cannot move");
-    if (collider.friction != body.colliders.front().friction) {
-      refuse("all shapes of a moving body must have the same friction");
-    }
-    if (collider.restitution != body.colliders.front().restitution) {
-      refuse("all shapes of a moving body must have the same restitution");
-    }
-    inner = std::max(inner, InnerRadius(collider.shape));
-    shapes.push_back(MakeBulletShape(collider.shape));
-    compound->addChildShape(ToBullet(pose_PB * collider.pose_BS), shapes.back().get());
-  }
-  btCollisionShape* shape = shapes.back().get();
-  const btTransform& placed = compound->getChildTransform(0);
-  if (body.colliders.size() > 1 || !(placed == btTransform::getIdentity())) {
-    shape = compound.get();
-    shapes.push_back(std::move(compound));
-  }
-
-  const Pose pose_WP = body.pose_WB * Pose{.orientation = inertia.orientation};
-  btRigidBody* rigid = Add(body.mass_kg, inertia.moments, shape, body.colliders.front(), pose_WP);
-  // The defaults (0.8 m/s, 1 rad/s) would put to sleep what a finger moves slowly.
-  rigid->setSleepingThresholds(1e-5, 1e-4);
-  rigid->setCcdMotionThreshold(inner / 2);
-  rigid->setCcdSweptSphereRadius(inner / 2);
-  rigid->setFlags(0);  // the hook turns the body, gyroscopic torque included
-  rigid->setUserIndex(static_cast<int>(moving.size()));
-  if (!body.falls) rigid->setGravity(btVector3(0, 0, 0));
-  if (const AirDrag air = AirDrag::On(body); air.acts()) {
-    drags.push_back({.moving = moving.size(), .air = air});
-  }
-  bodies.push_back({.moving = moving.size(), .q_BP = inertia.orientation});
-  moving.push_back({.rigid = rigid,
-                    .inertia = BodyInertia::Of(body.mass_kg, Mat3(inertia.moments.asDiagonal()))});
-}
-
-btRigidBody* BulletWorld::Engine::Add(double mass, const Vec3& moments, btCollisionShape* shape,
-                                      const Collider& surface, const Pose& pose) {
-  btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, shape, ToBullet(moments));
-  info.m_friction = std::sqrt(surface.friction);  // Bullet multiplies the two
-  info.m_startWorldTransform = ToBullet(pose);
-  rigid_bodies.push_back(std::make_unique<btRigidBody>(info));
-  btRigidBody* rigid = rigid_bodies.back().get();
-  rigid->setUserIndex(-1);                                // its place among the moving ones
-  rigid->setUserIndex2(static_cast<int>(bodies.size()));  // ... and in the scene
-  rigid->setUserIndex3(static_cast<int>(restitutions.size()));
-  restitutions.push_back(surface.restitution);
-  bounces = bounces || surface.restitution > 0;
-  world.addRigidBody(rigid);
-  return rigid;
-}
-
-// Exactly J/m and R I^-1 R^T L, between substeps. Never as a force: Bullet's friction rows do not
-// see the torque of forces.
 void BulletWorld::Engine::Apply(const Kick& kick) {
-  const Body& body = bodies[kick.body];
-  if (body.moving == kFixed) return;
-  if (kick.impulse.isZero(0) && kick.angular_impulse.isZero(0)) return;
-  const HookedBody& hooked = moving[body.moving];
-  btRigidBody& rigid = *hooked.rigid;
-  BodyState state{.pose = {.orientation = FromBullet(rigid.getWorldTransform().getRotation())},
-                  .velocity = FromBullet(rigid.getLinearVelocity()),
-                  .angular_velocity = FromBullet(rigid.getAngularVelocity())};
-  ApplyImpulse(hooked.inertia, kick.impulse, kick.angular_impulse, state);
-  rigid.setLinearVelocity(ToBullet(state.velocity));
-  rigid.setAngularVelocity(ToBullet(state.angular_velocity));
-  rigid.activate(true);
+  const std::size_t body = bodies.moving_of[kick.body];
+  if (body == BulletBodies::kFixed) return;
+  Mark(body, kick.impulse, kick.angular_impulse);
+  ApplyKick(bodies.moving[body], kick.impulse, kick.angular_impulse);
+  moved.push_back(body);
 }
 
-// The one place where the engine advances.
-void BulletWorld::Engine::Substep(double step_s) {
-  DropStaleContacts(world, step_s);
-  BeginSubstep(moving);
-  for (const Drag& drag : drags) {
-    const HookedBody& body = moving[drag.moving];
-    if (!body.rigid->isActive() && drag.air.wind.isZero()) continue;
-    BodyState state{.pose = {.orientation = body.orientation},
-                    .velocity = body.velocity,
-                    .angular_velocity = body.angular_velocity};
-    drag.air.Act(body.inertia, step_s, state);
-    body.rigid->setLinearVelocity(ToBullet(state.velocity));
-    body.rigid->setAngularVelocity(ToBullet(state.angular_velocity));
-    if (!drag.air.wind.isZero()) body.rigid->activate();
+void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
+  const MovingBody& body = bodies.moving[bodies.moving_of[push.body]];
+  const Kick kick = KickOf(push, body.State().pose.position);
+  ApplyKick(body, kick.impulse, kick.angular_impulse);
+}
+
+// Of a group alone.
+void BulletWorld::Engine::Step(const Group& group, double length_s, double longest_s) {
+  const int count = SubstepCount(length_s, longest_s);
+  for (int done = 0; done < count; ++done) world.Step(group, length_s / count);
+  substeps += static_cast<std::uint64_t>(count);
+}
+
+void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
+                                    std::span<const FineStep> steps, double window_s,
+                                    double substep_s, bool long_substeps) {
+  const GroupMotion motion = MotionOf(group, bodies, sleepers);
+  const bool is_pushed = std::any_of(group.members.begin(), group.members.end(),
+                                     [this](std::size_t body) { return pushed[body] != 0; });
+  if (!is_pushed && long_substeps) {
+    if (window_s > 0) Step(group, window_s, CoarseSubstep(motion, substep_s, window_s));
+    return;
   }
-  world.stepSimulation(step_s, 0);
-  EndSubstep(world, moving, step_s);
-  if (bounces) Rebound(world, moving, restitutions, step_s);
+  const double longest_s = PushedSubstep(motion, substep_s);
+  for (const FineStep& step : steps) {
+    for (const PlacedImpulse& push : step.pushes) {
+      const std::size_t body = bodies.moving_of[push.body];
+      if (body != BulletBodies::kFixed && islands.GroupOf(body) == place) Apply(push);
+    }
+    if (step.length_s > 0) Step(group, step.length_s, longest_s);
+  }
 }
 
-BodyState BulletWorld::Engine::State(const Body& body) const {
-  const btRigidBody& rigid = *moving[body.moving].rigid;
-  const Pose pose_WP = FromBullet(rigid.getWorldTransform());
-  return {.pose = pose_WP * Pose{.orientation = body.q_BP.conjugate()},
-          .velocity = FromBullet(rigid.getLinearVelocity()),
-          .angular_velocity = FromBullet(rigid.getAngularVelocity())};
-}
-
-// Adds what the solver gave in the last substep, each impulse to the nearest site of the same pair
-// and direction.
-void BulletWorld::Engine::AddImpulses(std::size_t body, std::span<const BodyState> states,
-                                      std::span<ContactSite> sites) {
-  const btRigidBody* rigid = moving[bodies[body].moving].rigid;
-  for (int i = 0; i < dispatcher.getNumManifolds(); ++i) {
-    const btPersistentManifold& manifold = *dispatcher.getManifoldByIndexInternal(i);
-    const bool is_first = manifold.getBody0() == rigid;
-    if (!is_first && manifold.getBody1() != rigid) continue;
-    const btCollisionObject* other = is_first ? manifold.getBody1() : manifold.getBody0();
-    const auto other_body = static_cast<std::size_t>(other->getUserIndex2());
-    for (int j = 0; j < manifold.getNumContacts(); ++j) {
-      const btManifoldPoint& point = manifold.getContactPoint(j);
-      if (!(point.m_appliedImpulse > 0)) continue;
-      const double side = is_first ? 1 : -1;
-      const Vec3 normal = side * FromBullet(point.m_normalWorldOnB);
-      const Vec3 where =
-          FromBullet(is_first ? point.getPositionWorldOnA() : point.getPositionWorldOnB());
-      ContactSite* nearest = nullptr;
-      double nearest_distance = std::numeric_limits<double>::infinity();
-      for (ContactSite& site : sites) {
-        if (site.other != other_body || site.normal.dot(normal) < 0.9) continue;
-        const Vec3 place = states[body].pose * site.p_B - site.radius * site.normal;
-        const double distance = (place - where).norm();
-        if (distance >= nearest_distance) continue;
-        nearest = &site;
-        nearest_distance = distance;
-      }
-      if (nearest == nullptr) continue;
-      nearest->impulse +=
-          point.m_appliedImpulse * normal +
-          side * point.m_appliedImpulseLateral1 * FromBullet(point.m_lateralFrictionDir1);
+void BulletWorld::Engine::PassWindow(std::span<const FineStep> steps, double window_s,
+                                     double substep_s, bool long_substeps) {
+  for (const FineStep& step : steps) {
+    for (const PlacedImpulse& push : step.pushes) {
+      const std::size_t body = bodies.moving_of[push.body];
+      if (body == BulletBodies::kFixed) continue;
+      // About a centre that may move a little until then.
+      const Kick kick = KickOf(push, bodies.moving[body].State().pose.position);
+      Mark(body, kick.impulse, kick.angular_impulse);
     }
   }
+  const std::span<Group> groups = islands.Plan(window_s, pushed_speed);
+  for (std::size_t place = 0; place < groups.size(); ++place) {
+    const Group& group = groups[place];
+    StepGroup(group, place, steps, window_s, substep_s, long_substeps);
+    for (const std::size_t body : group.members) {
+      if (!sleepers.Sleeps(body)) moved.push_back(body);
+    }
+    if (window_s > 0) {
+      sleepers.Watch(group.members, group.pairs, group.joints, pushed, window_s);
+    }
+  }
+  if (!(window_s > 0)) return;
+  for (const std::size_t body : all_pushed) {
+    pushed[body] = 0;
+    pushed_speed[body] = 0;
+  }
+  all_pushed.clear();
 }
 
-BulletWorld::BulletWorld(const Scene& scene, double longest_substep_s)
-    : scene_(scene), longest_substep_s_(longest_substep_s) {
-  if (!(longest_substep_s > 0)) throw std::invalid_argument("a substep must be longer than 0 s");
+void BulletWorld::Engine::Advance(std::span<const Stretch> stretches, double substep_s,
+                                  bool long_substeps) {
+  fine_steps.clear();
+  for (const Stretch& stretch : stretches) {
+    const int count = SubstepCount(stretch.length_s, substep_s);
+    for (int i = 0; i < count; ++i) {
+      fine_steps.push_back({.length_s = stretch.length_s / count,
+                            .pushes = i == 0 ? stretch.pushes : std::span<const PlacedImpulse>()});
+    }
+  }
+  std::size_t first = 0;
+  while (first < fine_steps.size()) {
+    double window_s = fine_steps[first].length_s;
+    std::size_t end = first + 1;
+    while (end < fine_steps.size() &&
+           window_s + fine_steps[end].length_s <= kWindow * (1 + kSameTime)) {
+      window_s += fine_steps[end++].length_s;
+    }
+    PassWindow(std::span(fine_steps).subspan(first, end - first), window_s, substep_s,
+               long_substeps);
+    first = end;
+  }
+}
+
+BulletWorld::BulletWorld(const Scene& scene, double substep_s)
+    : BulletWorld(scene, substep_s, EngineParts::Of(scene)) {}
+
+BulletWorld::BulletWorld(const Scene& scene, double substep_s, const EngineParts& parts)
+    : scene_(scene), substep_s_(substep_s) {
+  if (!(substep_s > 0)) throw std::invalid_argument("a substep must be longer than 0 s");
   bool moves = false;
   for (const SceneBody& body : scene.bodies) {
     states_.push_back({.pose = body.pose_WB});
     moves = moves || !body.fixed;
   }
-  if (moves) engine_ = std::make_unique<Engine>(scene);
+  if (moves) engine_ = std::make_unique<Engine>(scene, parts);
 }
 
 BulletWorld::~BulletWorld() = default;
@@ -289,31 +228,60 @@ bool BulletWorld::simulates() const {
   return engine_ != nullptr;
 }
 
+std::size_t BulletWorld::awake() const {
+  return engine_ ? engine_->sleepers.awake().size() : 0;
+}
+
+std::uint64_t BulletWorld::substeps() const {
+  return engine_ ? engine_->substeps : 0;
+}
+
 BodyState BulletWorld::State(std::size_t body) const {
   return states_[body];
+}
+
+void BulletWorld::ReadStates() {
+  for (const std::size_t place : engine_->moved) {
+    const MovingBody& body = engine_->bodies.moving[place];
+    states_[static_cast<std::size_t>(body.rigid->getUserIndex2())] = body.State();
+  }
+  engine_->moved.clear();
+}
+
+void BulletWorld::SetState(std::size_t body, const BodyState& state) {
+  if (!engine_ || scene_.bodies[body].fixed) return;
+  const std::size_t place = engine_->bodies.moving_of[body];
+  engine_->sleepers.Wake(place);
+  engine_->bodies.moving[place].SetState(state);
+  states_[body] = state;
 }
 
 void BulletWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   if (!engine_) return;
   for (const Kick& kick : kicks) engine_->Apply(kick);
-  if (period_s > 0) {
-    const int count = SubstepCount(period_s, longest_substep_s_);
-    for (int done = 0; done < count; ++done) engine_->Substep(period_s / count);
-  }
-  for (std::size_t i = 0; i < states_.size(); ++i) {
-    if (engine_->bodies[i].moving != Engine::kFixed)
-      states_[i] = engine_->State(engine_->bodies[i]);
-  }
+  const Stretch whole{.length_s = period_s};
+  if (period_s > 0) engine_->Advance({&whole, 1}, substep_s_, false);
+  ReadStates();
+}
+
+void BulletWorld::Play(std::span<const Stretch> stretches) {
+  if (!engine_) return;
+  engine_->Advance(stretches, substep_s_, engine_->parts.long_substeps);
+  ReadStates();
 }
 
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
   if (!engine_ || scene_.bodies[body].fixed) return false;
   const std::size_t first = sites.size();
-  if (!FindContactSites(scene_, states_, body, reach_m, sites)) return false;
+  if (!site_finder_.Find(states_, body, reach_m, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);
   for (ContactSite& site : found) site.gap += engine_->resting_depth;
-  engine_->AddImpulses(body, states_, found);
+  const std::size_t place = engine_->bodies.moving_of[body];
+  const MovingBody& moving = engine_->bodies.moving[place];
+  // Of a substep as long as those of what is pushed, however long the last one was.
+  const double scale = moving.last_step_s > substep_s_ ? substep_s_ / moving.last_step_s : 1;
+  AddImpulses(moving, states_[body].pose, engine_->pairs.Of(place), scale, found);
   return true;
 }
 

@@ -11,6 +11,7 @@ struct ContactPoint {
   Vec3 point_W = Vec3::Zero();    // m, of the first shape
   Vec3 normal_W = Vec3::UnitZ();  // unit, out of the second shape
   double gap = 0;                 // m, along the normal; < 0 = penetration
+  double radius = 0;              // m, of the first shape's rounding there; 0 = a corner
 };
 
 inline constexpr std::size_t kMostContactPoints = 8;  // of one pair of shapes

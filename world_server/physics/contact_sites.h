@@ -8,15 +8,30 @@
 #include <vector>
 
 #include "world_server/physics/dynamics_world.h"
+#include "world_server/physics/solid.h"
 #include "world_server/scene/scene.h"
 
 namespace rikiseki::world {
 
-/// Appends the contacts of `body` with a gap of at most `reach_m`, deepest first. Boxes against boxes,
-/// spheres and half-spaces, spheres against everything but meshes; false, and nothing appended, if
-/// another pair, or one that bounces, is within reach. `states` go with `scene.bodies`; impulses are
-/// left at zero.
-bool FindContactSites(const Scene& scene, std::span<const BodyState> states, std::size_t body,
-                      double reach_m, std::vector<ContactSite>& sites);
+class SiteFinder {
+ public:
+  /// `scene` outlives this.
+  explicit SiteFinder(const Scene& scene);
+
+  /// Appends the contacts of `body` with a gap of at most `reach_m`, deepest first; false, and nothing
+  /// appended, if a pair that bounces is within reach. `states` go with the scene's bodies; impulses
+  /// are left at zero.
+  bool Find(std::span<const BodyState> states, std::size_t body, double reach_m,
+            std::vector<ContactSite>& sites) const;
+
+ private:
+  struct Placed {
+    BodyInertia inertia;
+    std::vector<Solid> solids;  // of its colliders
+  };
+
+  const Scene& scene_;
+  std::vector<Placed> bodies_;
+};
 
 }  // namespace rikiseki::world

@@ -1,79 +1,20 @@
 #include "world_server/physics/cylinder_contact.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <utility>
 
-#include "world_server/physics/box_faces.h"
+#include "world_server/physics/placed_cylinder.h"
 
 namespace rikiseki::world {
 namespace {
 
-constexpr int kRimPoints = 8;
-constexpr int kCapSides = 16;        // of the polygon round a cap that a box's face is clipped to
-constexpr double kFlat = 1e-3;       // sine: tilted by less, the fixed points tell all but 1e-4 r
-constexpr double kOverCap = 0.2;     // sine: tilted by more, a cap is far from landing
 constexpr double kSharp = 1e-6;      // sine: more parallel, a support is an edge and not a corner
 constexpr double kAlongEdge = 1e-3;  // sine: the side lies along an edge, not across it
 constexpr int kDirections = 32;      // looked at round an edge before the best is refined
 constexpr int kRefinements = 40;     // golden sections: 0.2 rad to 1e-9
-
-struct PlacedCylinder {
-  Vec3 centre;
-  Mat3 axes;
-  Vec3 axis;
-  double radius, half_length;
-
-  PlacedCylinder(const Cylinder& cylinder, const Pose& pose)
-      : centre(pose.position),
-        axes(pose.orientation.toRotationMatrix()),
-        axis(axes.col(2)),
-        radius(cylinder.radius),
-        half_length(cylinder.half_length) {}
-
-  // Half the extent along a unit direction.
-  double Extent(const Vec3& direction) const {
-    const double along = axis.dot(direction);
-    return half_length * std::abs(along) + radius * std::sqrt(std::max(0.0, 1 - along * along));
-  }
-
-  double CapSide(const Vec3& normal) const { return axis.dot(normal) > 0 ? -1 : 1; }
-
-  // Of the cap that looks against `normal`; always the same points of it, counter-clockwise about
-  // the axis.
-  Polygon Cap(const Vec3& normal) const {
-    const Vec3 middle = centre + CapSide(normal) * half_length * axis;
-    Polygon rim;
-    for (int i = 0; i < kRimPoints; ++i) {
-      const double angle = 2 * std::numbers::pi * i / kRimPoints;
-      rim.push_back(middle +
-                    radius * (std::cos(angle) * axes.col(0) + std::sin(angle) * axes.col(1)));
-    }
-    return rim;
-  }
-
-  // The line of the side that lies furthest against `normal`, from the nearer cap to the other.
-  Polygon Side(const Vec3& normal) const {
-    const Vec3 across = normal - axis.dot(normal) * axis;
-    const Vec3 middle = centre - radius * across.normalized();
-    const Vec3 along = CapSide(normal) * half_length * axis;
-    return {middle + along, middle - along};
-  }
-
-  double Sine(const Vec3& normal) const { return axis.cross(normal).norm(); }
-};
-
-// What of the cylinder may touch a face that looks along `normal`, as polygons and points.
-std::vector<Polygon> Against(const PlacedCylinder& cylinder, const Vec3& normal) {
-  const double sine = cylinder.Sine(normal);
-  if (sine >= kOverCap) return {cylinder.Side(normal)};
-  std::vector<Polygon> found = {cylinder.Cap(normal)};
-  if (sine > kFlat) found.push_back({cylinder.Side(normal)[0]});
-  return found;
-}
 
 // Out of the box, towards the cylinder; > 0: so far apart at least.
 struct Separation {
@@ -113,7 +54,7 @@ class Pair {
       AddCap(cap.normal);
     }
     // Beside a face, though no edge is clearly the better axis.
-    if (points_.empty() && cylinder_.Sine(edge.normal) > kFlat) AddEdge(edge);
+    if (points_.empty() && cylinder_.Sine(edge.normal) > kFlatCap) AddEdge(edge);
     std::erase_if(points_, [&](const ContactPoint& point) { return !(point.gap <= reach_); });
     KeepSome(points_);
     return points_;
@@ -188,9 +129,10 @@ class Pair {
 
   void AddFace(const Vec3& normal, int axis) {
     const double face = normal.dot(box_.centre) + box_.half[axis];
-    for (const Polygon& polygon : Against(cylinder_, normal)) {
+    const double rounding = cylinder_.RoundingAgainst(normal);
+    for (const Polygon& polygon : cylinder_.Against(normal)) {
       for (const Vec3& point : ClipToFace(polygon, box_, axis)) {
-        points_.push_back({point, normal, normal.dot(point) - face});
+        points_.push_back({point, normal, normal.dot(point) - face, rounding});
       }
     }
     if (points_.empty() && cylinder_.Sine(normal) < kOverCap) AddRim(normal, face);
@@ -210,14 +152,8 @@ class Pair {
 
   void AddCap(const Vec3& normal) {
     const Vec3 middle = cylinder_.centre - cylinder_.half_length * normal;
-    Polygon polygon = box_.FaceAgainst(-normal);
-    for (int i = 0; i < kCapSides; ++i) {
-      const double angle = 2 * std::numbers::pi * i / kCapSides;
-      const Vec3 out =
-          std::cos(angle) * cylinder_.axes.col(0) + std::sin(angle) * cylinder_.axes.col(1);
-      polygon = Clip(polygon, out, out.dot(middle) + cylinder_.radius);
-    }
-    for (const Vec3& point : polygon) {
+    for (const Vec3& point :
+         ClipToBorder(box_.FaceAgainst(-normal), cylinder_.RoundCap(-normal), -normal)) {
       const double gap = normal.dot(middle - point);
       points_.push_back({point + gap * normal, normal, gap});
     }
@@ -276,10 +212,12 @@ std::vector<ContactPoint> FindCylinderPlaneContact(const Cylinder& cylinder, con
                                                    const Vec3& normal_W, double offset_m,
                                                    double reach_m) {
   std::vector<ContactPoint> points;
-  for (const Polygon& polygon : Against(PlacedCylinder(cylinder, pose_WC), normal_W)) {
+  const PlacedCylinder placed(cylinder, pose_WC);
+  const double rounding = placed.RoundingAgainst(normal_W);
+  for (const Polygon& polygon : placed.Against(normal_W)) {
     for (const Vec3& point : polygon) {
       const double gap = normal_W.dot(point) - offset_m;
-      if (gap <= reach_m) points.push_back({point, normal_W, gap});
+      if (gap <= reach_m) points.push_back({point, normal_W, gap, rounding});
     }
   }
   return points;

@@ -109,6 +109,10 @@ BodyState DeformableWorld::State(std::size_t body) const {
   return rigid_->State(body);
 }
 
+void DeformableWorld::SetState(std::size_t body, const BodyState& state) {
+  if (soft_of_body_[body] == nullptr) rigid_->SetState(body, state);
+}
+
 void DeformableWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   rigid_kicks_.clear();
   for (const Kick& kick : kicks) {
@@ -117,6 +121,29 @@ void DeformableWorld::ApplyAndStep(std::span<const Kick> kicks, double period_s)
   }
   rigid_->ApplyAndStep(rigid_kicks_, period_s);
   for (const auto& soft : soft_) soft->Advance(period_s);
+}
+
+void DeformableWorld::Play(std::span<const Stretch> stretches) {
+  std::size_t room = 0;
+  for (const Stretch& stretch : stretches) room += stretch.pushes.size();
+  rigid_pushes_.clear();
+  rigid_pushes_.reserve(room);  // the stretches point into it
+  rigid_stretches_.clear();
+  for (const Stretch& stretch : stretches) {
+    const std::size_t first = rigid_pushes_.size();
+    for (const PlacedImpulse& push : stretch.pushes) {
+      Soft* soft = soft_of_body_[push.body];
+      if (soft == nullptr) {
+        rigid_pushes_.push_back(push);
+      } else {
+        soft->Push(KickOf(push, soft->pose_WB.position));
+      }
+    }
+    for (const auto& soft : soft_) soft->Advance(stretch.length_s);
+    rigid_stretches_.push_back(
+        {.length_s = stretch.length_s, .pushes = std::span(rigid_pushes_).subspan(first)});
+  }
+  rigid_->Play(rigid_stretches_);
 }
 
 bool DeformableWorld::FindContacts(std::size_t body, double reach_m,

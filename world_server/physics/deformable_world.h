@@ -31,9 +31,14 @@ class DeformableWorld final : public DynamicsWorld {
   /// Of a soft body the frame that its shape was meshed in, at rest: what holds it does not move.
   BodyState State(std::size_t body) const override;
 
+  /// A soft body is left as it is.
+  void SetState(std::size_t body, const BodyState& state) override;
+
   /// The push of a soft body enters as a steady force over the time for which it stands, at the latest
   /// kStepS later.
   void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
+
+  void Play(std::span<const Stretch> stretches) override;
 
   bool FindContacts(std::size_t body, double reach_m,
                     std::vector<ContactSite>& sites) const override;
@@ -46,6 +51,8 @@ class DeformableWorld final : public DynamicsWorld {
   std::vector<std::unique_ptr<Soft>> soft_;
   std::vector<Soft*> soft_of_body_;  // null of rigid ones
   std::vector<Kick> rigid_kicks_;
+  std::vector<PlacedImpulse> rigid_pushes_;
+  std::vector<Stretch> rigid_stretches_;
 };
 
 }  // namespace rikiseki::world

@@ -20,6 +20,26 @@ struct Kick {
   Vec3 angular_impulse = Vec3::Zero();  // N m s, about the body's centre of mass, in W
 };
 
+/// An impulse of which it is known where in the world it acts, but not yet where its body will be.
+struct PlacedImpulse {
+  std::size_t body = 0;
+  Vec3 impulse = Vec3::Zero();          // N s, in W
+  Vec3 angular_impulse = Vec3::Zero();  // N m s, about the world origin, in W
+};
+
+/// The push as a kick of a body whose centre of mass is there [m, in W].
+inline Kick KickOf(const PlacedImpulse& push, const Vec3& centre) {
+  return {.body = push.body,
+          .impulse = push.impulse,
+          .angular_impulse = push.angular_impulse - centre.cross(push.impulse)};
+}
+
+/// A part of a period, and what enters at its start.
+struct Stretch {
+  double length_s = 0;
+  std::span<const PlacedImpulse> pushes = {};
+};
+
 /// Where a body touches, or may soon touch, another: a point of the body and a plane of the other.
 struct ContactSite {
   std::size_t other = 0;
@@ -41,9 +61,18 @@ class DynamicsWorld {
   virtual std::size_t body_count() const = 0;
   virtual BodyState State(std::size_t body) const = 0;
 
+  /// Puts a moving body somewhere, at some velocity, between two steps: where a scene that takes
+  /// another's place goes on with a body of it.
+  virtual void SetState(std::size_t body, const BodyState& state) = 0;
+
   /// v += J/m and w += I^-1 L for every kick, then advances by `period_s` >= 0. Kicks of fixed bodies
   /// are ignored. The one place where impulses enter the dynamics.
   virtual void ApplyAndStep(std::span<const Kick> kicks, double period_s) = 0;
+
+  /// The stretches one after the other, the pushes as kicks at where the bodies are by then. No stretch is
+  /// stepped together with the next where a push comes between; what no push reaches may be advanced in
+  /// other steps, but has come as far when this returns. By default: ApplyAndStep, stretch by stretch.
+  virtual void Play(std::span<const Stretch> stretches);
 
   /// Every contact of a moving body whose gap is at most `reach_m`, appended to `sites`, deepest
   /// first. False, and nothing, where that cannot be told: the body then has no local copy.

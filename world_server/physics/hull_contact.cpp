@@ -145,12 +145,8 @@ class Pair {
 
   void AddOverHull() {
     const Vec3 normal = -face_->normal;
-    Polygon polygon = box_.FaceAgainst(face_->normal);
-    const Polygon corners = CornersOf(hull_, *face_);
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      const Vec3 out = (corners[(i + 1) % corners.size()] - corners[i]).cross(face_->normal);
-      polygon = Clip(polygon, out, out.dot(corners[i]));
-    }
+    const Polygon polygon =
+        ClipToBorder(box_.FaceAgainst(face_->normal), CornersOf(hull_, *face_), face_->normal);
     for (const Vec3& point : polygon) {
       const double gap = face_->normal.dot(point) - face_->offset;
       points_.push_back({point + gap * normal, normal, gap});

@@ -38,6 +38,12 @@ BodyState SlidingBlock::State(std::size_t body) const {
   return state;
 }
 
+void SlidingBlock::SetState(std::size_t body, const BodyState& state) {
+  if (body != block_) return;
+  displacement_ = state.pose.position.x() - states_[block_].pose.position.x();
+  velocity_ = state.velocity.x();
+}
+
 void SlidingBlock::ApplyAndStep(std::span<const Kick> kicks, double period_s) {
   for (const Kick& kick : kicks) {
     if (kick.body == block_) velocity_ += kick.impulse.x() / mass_kg_;

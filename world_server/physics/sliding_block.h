@@ -29,6 +29,7 @@ class SlidingBlock final : public DynamicsWorld {
 
   std::size_t body_count() const override { return states_.size(); }
   BodyState State(std::size_t body) const override;
+  void SetState(std::size_t body, const BodyState& state) override;
   void ApplyAndStep(std::span<const Kick> kicks, double period_s) override;
 
   /// The floor, under the block's centre.

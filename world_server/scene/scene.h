@@ -1,4 +1,5 @@
 // A scene as the world runs it: bodies with shapes, masses and surfaces. sdf_loader.h reads it from SDF.
+// Equality is that of the description, to the bit.
 #pragma once
 
 #include <array>
@@ -15,36 +16,49 @@
 namespace rikiseki::world {
 
 struct Box {
-  Vec3 half_extents = Vec3::Zero();
-};  // m
+  Vec3 half_extents = Vec3::Zero();  // m
+  bool operator==(const Box&) const = default;
+};
 struct Sphere {
-  double radius = 0;
-};  // m
+  double radius = 0;  // m
+  bool operator==(const Sphere&) const = default;
+};
 struct HalfSpace {
-  Vec3 normal = Vec3::UnitZ();
-};  // unit, out of the solid; through its origin
+  Vec3 normal = Vec3::UnitZ();  // unit, out of the solid; through its origin
+  bool operator==(const HalfSpace&) const = default;
+};
 struct Cylinder {
-  double radius = 0, half_length = 0;
-};  // m, axis z
+  double radius = 0, half_length = 0;  // m, axis z
+  bool operator==(const Cylinder&) const = default;
+};
 struct Capsule {
-  double radius = 0, half_length = 0;
-};  // m, axis z, without the caps
+  double radius = 0, half_length = 0;  // m, axis z, without the caps
+  bool operator==(const Capsule&) const = default;
+};
 struct Ellipsoid {
-  Vec3 radii = Vec3::Zero();
-};  // m
+  Vec3 radii = Vec3::Zero();  // m
+  bool operator==(const Ellipsoid&) const = default;
+};
 /// Where triangles came from, for observers.
 struct MeshFile {
   std::string path;
   std::array<std::uint8_t, 32> sha256{};  // of its bytes
   Vec3 scale = Vec3::Ones();
+  bool operator==(const MeshFile&) const = default;
 };
 struct Hull {  // convex and closed
   std::shared_ptr<const TriangleMesh> mesh;
   MeshFile file = {};
+  bool operator==(const Hull& other) const {
+    return file == other.file && SameTriangles(mesh.get(), other.mesh.get());
+  }
 };
 struct Mesh {  // any; of bodies that cannot move
   std::shared_ptr<const TriangleMesh> mesh;
   MeshFile file = {};
+  bool operator==(const Mesh& other) const {
+    return file == other.file && SameTriangles(mesh.get(), other.mesh.get());
+  }
 };
 using Shape = std::variant<Box, Sphere, HalfSpace, Cylinder, Capsule, Ellipsoid, Hull, Mesh>;
 
@@ -58,6 +72,8 @@ struct Collider {
   std::optional<double> damping_ns_per_m = {};
   std::optional<double> static_friction = {};  // for the finger; none = as `friction`
   double recovery_s = 0;  // its force takes this long to come and go; 0 = the haptic side's own
+
+  bool operator==(const Collider&) const = default;
 };
 
 /// What a body that deforms is made of; its mass is spread evenly over its one collider.
@@ -66,6 +82,8 @@ struct Softness {
   double poisson_ratio = 0.3;
   double relaxation_s = 0.02;  // damping: stress = C (strain + relaxation strain rate)
   double element_m = 0;        // edge of the tetrahedra, roughly
+
+  bool operator==(const Softness&) const = default;
 };
 
 struct SceneBody {
@@ -80,12 +98,16 @@ struct SceneBody {
   Vec3 wind = Vec3::Zero();     // m/s, of the air round this body
   std::vector<Collider> colliders = {};
   std::optional<Softness> softness = {};  // none: rigid
+
+  bool operator==(const SceneBody&) const = default;
 };
 
 struct Scene {
   std::string name;
   Vec3 gravity = Vec3(0, 0, -9.81);
-  std::vector<SceneBody> bodies;  // a body's id on the wire is its place here
+  std::vector<SceneBody> bodies;  // what they are called on the wire: body_numbers.h
+
+  bool operator==(const Scene&) const = default;
 };
 
 }  // namespace rikiseki::world

@@ -63,7 +63,7 @@ const MeshFile* FileOf(const Shape& shape) {
 }  // namespace
 
 protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol::Body> bodies,
-                                   std::uint64_t revision) {
+                                   std::uint64_t revision, const SceneUse& use) {
   protocol::WorldScene message;
   message.revision = revision;
   message.gravity = ToArray(scene.gravity);
@@ -83,7 +83,7 @@ protocol::WorldScene DescribeScene(const Scene& scene, std::span<const protocol:
       }
     }
   }
-  const SceneNeeds worked_out = WorkOutNeeds(scene);
+  const SceneNeeds worked_out = WorkOutNeeds(scene, use);
   message.needs = worked_out.needs;
   message.left_out = worked_out.left_out;
   return message;

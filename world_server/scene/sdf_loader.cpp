@@ -9,6 +9,7 @@
 #include <iostream>
 #include <regex>
 #include <sdf/sdf.hh>
+#include <set>
 #include <sstream>
 
 #include "common/config.h"
@@ -316,6 +317,19 @@ class Loader {
   std::vector<std::pair<std::size_t, sdf::ElementPtr>> soft_links_;  // by place in the scene
 };
 
+// The files that an element and all in it were read from.
+void AddFiles(const sdf::ElementPtr& element, std::set<std::string>& files) {
+  if (std::filesystem::is_regular_file(element->FilePath())) files.insert(element->FilePath());
+  for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
+    AddFiles(child, files);
+  }
+}
+
+void AddMeshFile(const Shape& shape, std::set<std::string>& files) {
+  if (const auto* hull = std::get_if<Hull>(&shape)) files.insert(hull->file.path);
+  if (const auto* mesh = std::get_if<Mesh>(&shape)) files.insert(mesh->file.path);
+}
+
 }  // namespace
 
 LoadedScene LoadSdf(const std::string& path) {
@@ -361,6 +375,14 @@ LoadedScene LoadSdf(const std::string& path) {
     Refuse(world.Element(),
            "world " + world.Name() + " is empty; at least one model with a collision is expected");
   }
+  std::set<std::string> files;
+  AddFiles(root.Element(), files);
+  for (const SceneBody& body : loaded.scene.bodies) {
+    for (const Collider& collider : body.colliders) AddMeshFile(collider.shape, files);
+  }
+  files.erase(path);
+  loaded.files = {path};
+  loaded.files.insert(loaded.files.end(), files.begin(), files.end());
   return loaded;
 }
 

@@ -13,6 +13,7 @@ namespace rikiseki::world {
 struct LoadedScene {
   Scene scene;
   std::vector<std::string> warnings;  // "file:line: what is not used", one line each
+  std::vector<std::string> files;     // that it was read from: the scene's own first
 };
 
 /// Every link with collisions becomes a body, "model::link". Throws ConfigError with one line:

@@ -99,6 +99,28 @@ TEST_CASE("under a constant force the hand settles at F/k") {
   REQUIRE(hand.target().x() == Approx(20));
 }
 
+TEST_CASE("a stirring hand goes everywhere in its box, and the same way for the same seed") {
+  const Vec3 corner(-0.06, 0.05, -0.02), opposite(0.06, -0.05, 0.04);
+  const auto strokes = StirringStrokes(corner, opposite, 0.3, 0.1, 1, 400);
+  REQUIRE(strokes.size() == 800);
+  Vec3 low = strokes[0].to, high = strokes[0].to;
+  for (std::size_t i = 0; i < strokes.size(); i += 2) {
+    CHECK(strokes[i].duration_s == 0.3);
+    CHECK(strokes[i + 1].duration_s == 0.1);
+    CHECK(strokes[i].to == strokes[i + 1].to);
+    low = low.cwiseMin(strokes[i].to);
+    high = high.cwiseMax(strokes[i].to);
+  }
+  const Vec3 box_low = corner.cwiseMin(opposite), box_high = corner.cwiseMax(opposite);
+  CHECK((low - box_low).minCoeff() >= 0);
+  CHECK((box_high - high).minCoeff() >= 0);
+  // The chance that 400 places leave 5 % of an axis empty is 1e-9.
+  CHECK((low - box_low).maxCoeff() < 0.05 * 0.12);
+  CHECK((box_high - high).maxCoeff() < 0.05 * 0.12);
+  CHECK(StirringStrokes(corner, opposite, 0.3, 0, 1, 2)[1].to == strokes[2].to);
+  CHECK(StirringStrokes(corner, opposite, 0.3, 0, 2, 2)[1].to != strokes[2].to);
+}
+
 TEST_CASE("a stroke follows the minimum-jerk profile") {
   REQUIRE(MinimumJerk(-1) == 0);
   REQUIRE(MinimumJerk(0.5) == 0.5);

@@ -39,7 +39,7 @@ ImpulseUnits Discarded(const LedgerBooks& books, DiscardReason reason) {
 LedgerReader MakeReader(Coupling coupling = Coupling::kImpulse, double largest = kNoCap,
                         std::uint64_t own_epoch = kOwn) {
   LedgerReader reader(own_epoch, coupling, largest);
-  reader.SetBodies({{1, true}, {1, true}, {1, false}});
+  reader.SetBodies({{1, true, 0}, {1, true, 1}, {1, false, 2}});
   reader.BeginEpoch(5);
   return reader;
 }
@@ -332,6 +332,45 @@ TEST_CASE("what is pending for a scene that goes is declared not applied") {
   reader.Take();
   CHECK(Discarded(reader.epoch_books(), DiscardReason::kUnknownBody) == ImpulseUnits{120, 0, 0});
   CHECK(reader.epoch_books().applied == ImpulseUnits{});
+}
+
+TEST_CASE("what is pending for a body that stays the same is applied where it now stands") {
+  for (const Coupling coupling : {Coupling::kImpulse, Coupling::kLocal}) {
+    LedgerReader reader = MakeReader(coupling);
+    reader.Consume(Message(1, {On(0, 0), On(1, 0)}));
+    reader.Consume(Message(2, {On(0, 70), On(1, 100)}));
+    reader.BeginEpoch(6);
+    reader.Consume(Message(1, {On(0, 0), On(1, 0)}));
+    reader.Consume(Message(2, {On(0, 7), On(1, 10)}));
+    reader.SetBodies({{2, true, 0}, {1, true, 5}});  // 0 is another thing now, 2 is gone
+    const auto owed = reader.Take();
+    REQUIRE(owed.size() == 1);
+    CHECK(owed[0].body == 5);
+    CHECK(owed[0].impulse.x() == Approx(110e-12));
+    CHECK(reader.epoch_books().applied == ImpulseUnits{10, 0, 0});
+    CHECK(reader.life_books().applied == ImpulseUnits{110, 0, 0});
+    CHECK(Discarded(reader.epoch_books(), DiscardReason::kUnknownBody) == ImpulseUnits{7, 0, 0});
+    CHECK(Discarded(reader.life_books(), DiscardReason::kUnknownBody) == ImpulseUnits{77, 0, 0});
+    if (coupling != Coupling::kLocal) continue;
+    REQUIRE(reader.replay().ticks.size() == 4);
+    REQUIRE(reader.replay().impulses.size() == 2);
+    CHECK(reader.replay().ticks[1].end == 1);
+    CHECK(reader.replay().ticks[3].end == 2);
+    CHECK(reader.replay().impulses[0].body == 5);
+    CHECK(reader.replay().impulses[1].impulse.x() == Approx(10e-12));
+  }
+}
+
+TEST_CASE("a push and its opposite of two haptic epochs are each in their own books") {
+  LedgerReader reader = MakeReader();
+  reader.Consume(Message(1, {On(0, 0)}));
+  reader.Consume(Message(2, {On(0, 100)}));
+  reader.BeginEpoch(6);
+  reader.Consume(Message(1, {On(0, 0)}));
+  reader.Consume(Message(2, {On(0, -100)}));
+  CHECK(reader.Take().empty());
+  CHECK(reader.epoch_books().applied == ImpulseUnits{-100, 0, 0});
+  CHECK(reader.life_books().applied == ImpulseUnits{});
 }
 
 TEST_CASE("random bytes do no harm") {

@@ -30,6 +30,7 @@ class Recorder final : public DynamicsWorld {
  public:
   std::size_t body_count() const override { return 1; }
   BodyState State(std::size_t) const override { return {}; }
+  void SetState(std::size_t, const BodyState&) override {}
   void ApplyAndStep(std::span<const Kick> kicks, double period_s) override {
     ++calls;
     for (const Kick& kick : kicks) {

@@ -157,13 +157,27 @@ TEST_CASE("a body that gets none leaves the room to others") {
   CHECK(found.Names() == std::set<std::uint32_t>{6});
 }
 
-TEST_CASE("a shape that is not known, on the body or beside it, means no copy") {
+TEST_CASE("a neighbour that bounces means no copy") {
   Scene scene = OnFloor({CubeAt(0), CubeAt(0.065)});
-  scene.bodies[2].colliders[0].shape = Cylinder{0.03, 0.03};
+  scene.bodies[1].colliders[0].restitution = scene.bodies[2].colliders[0].restitution = 0.5;
   CHECK(Find(scene, {1}).count == 0);
   CHECK(Find(scene, {2}).count == 0);
-  scene.bodies[2].mass_kg = 100;  // heavy, but its surface is not known either
+  scene.bodies[2].mass_kg = 100;  // heavy, but a plane does not throw it back
   CHECK(Find(scene, {1}).count == 0);
+}
+
+TEST_CASE("a copy has contacts whatever its shape and its neighbour's") {
+  for (const Shape& shape : {Shape(Cylinder{0.03, 0.03}), Shape(Capsule{0.02, 0.01}),
+                             Shape(Ellipsoid{{0.03, 0.03, 0.03}})}) {
+    Scene scene = OnFloor({CubeAt(0), CubeAt(0.065)});
+    scene.bodies[2].colliders[0].shape = shape;
+    CAPTURE(shape.index());
+    CHECK(Find(scene, {1}).Names() == std::set<std::uint32_t>{1, 2});
+    const Found found = Find(scene, {2});
+    CHECK(found.Names() == std::set<std::uint32_t>{1, 2});
+    CHECK(found.Contacts(1, 2) >= 1);
+    CHECK(found.Contacts(2, 0) >= 1);
+  }
 }
 
 TEST_CASE("more contacts than a copy can tell mean no copy") {

@@ -1,5 +1,3 @@
-#include "world_server/physics/bullet_hooks.h"
-
 #include <catch2/catch.hpp>
 #include <cmath>
 

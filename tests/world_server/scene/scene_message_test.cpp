@@ -34,8 +34,9 @@ TEST_CASE("a scene is described body by body, collider by collider") {
   CHECK(message.revision == 5);
   CHECK(message.gravity == protocol::Vector{0, 0, -1.5});
   CHECK(std::string(message.name.data()) == std::string(63, 's'));
-  CHECK(message.needs == protocol::kNeedMovingBodies);
-  CHECK((message.needs & message.left_out) == 0);
+  CHECK(message.needs == (protocol::kNeedMovingBodies | protocol::kNeedFastBodies |
+                          protocol::kNeedFriction | protocol::kNeedLocalBodies));
+  CHECK(message.left_out == (protocol::kAllSceneNeeds ^ message.needs));
   REQUIRE(message.bodies.size() == 2);
   CHECK(message.bodies[0].fixed == 1);
   CHECK(message.bodies[0].generation == 3);
@@ -70,8 +71,7 @@ TEST_CASE("a scene is described body by body, collider by collider") {
   scene.bodies.resize(1);
   const protocol::WorldScene still = DescribeScene(scene, bodies, 6);
   CHECK(still.needs == 0);
-  CHECK((still.left_out & protocol::kNeedMovingBodies) != 0);
-  CHECK((still.needs & still.left_out) == 0);
+  CHECK(still.left_out == protocol::kAllSceneNeeds);
 }
 
 }  // namespace

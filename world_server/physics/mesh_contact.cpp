@@ -1,0 +1,228 @@
+#include "world_server/physics/mesh_contact.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "world_server/physics/convex_contact.h"
+#include "world_server/scene/shape_size.h"
+
+namespace rikiseki::world {
+namespace {
+
+constexpr double kOnePlane =
+    1e-6;                         // sine, and of the shape's size: points so alike are of one place
+constexpr double kWithin = 1e-6;  // of a cosine: a direction between two normals
+constexpr double kDeepest = 1e-3;  // of the shape: points so near the deepest carry the load
+constexpr double kFlatCorner =
+    1e-6;  // of the shape: a corner of the support polygon stands out so far
+
+constexpr std::size_t kMostMeshPoints = 24;  // more than a local copy takes
+
+// Leaves the corners of the points' outline across their normal, in its order.
+void KeepOutline(std::vector<ContactPoint>& points, double size) {
+  if (points.size() < 3) return;
+  const Vec3 normal = points[0].normal_W;
+  const Vec3 u =
+      (std::abs(normal.x()) < 0.7 ? Vec3::UnitX() : Vec3::UnitY()).cross(normal).normalized();
+  const Vec3 v = normal.cross(u);
+  struct Flat {
+    double x, y;
+    std::size_t index;
+  };
+  std::vector<Flat> flat;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    flat.push_back({u.dot(points[i].point_W), v.dot(points[i].point_W), i});
+  }
+  std::ranges::sort(flat, [](const Flat& a, const Flat& b) {
+    return std::tuple(a.x, a.y, a.index) < std::tuple(b.x, b.y, b.index);
+  });
+  // Andrew's monotone chain; what stands out by less than the tolerance is no corner.
+  const double least = kFlatCorner * size;
+  std::vector<Flat> outline;
+  const auto turns = [&](const Flat& a, const Flat& b, const Flat& c) {
+    const double length = std::hypot(c.x - a.x, c.y - a.y);
+    const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+    return length > least ? area > least * length : std::hypot(b.x - a.x, b.y - a.y) > least;
+  };
+  for (int side = 0; side < 2; ++side) {
+    const std::size_t start = outline.size();
+    for (const Flat& next : flat) {
+      while (outline.size() >= start + 2 &&
+             !turns(outline[outline.size() - 2], outline.back(), next)) {
+        outline.pop_back();
+      }
+      if (outline.size() > start &&
+          std::hypot(next.x - outline.back().x, next.y - outline.back().y) <= least) {
+        continue;
+      }
+      outline.push_back(next);
+    }
+    if (outline.size() > start + 1) outline.pop_back();
+    std::ranges::reverse(flat);
+  }
+  if (outline.size() == 2 &&
+      std::hypot(outline[0].x - outline[1].x, outline[0].y - outline[1].y) <= least) {
+    outline.pop_back();
+  }
+  std::vector<ContactPoint> kept;
+  for (const Flat& corner : outline) kept.push_back(points[corner.index]);
+  points = std::move(kept);
+}
+
+class MeshContact {
+ public:
+  MeshContact(const PlacedConvex& convex, const TriangleMesh& mesh, double size, double reach)
+      : convex_(convex),
+        mesh_(mesh),
+        size_(size),
+        reach_(reach),
+        margin_(kEdgeMargin * convex.thinnest()) {}
+
+  void Look(std::uint32_t face) {
+    const TriangleMesh::Face& triangle = mesh_.faces()[face];
+    PlacedTriangle placed{.corners = {}, .normal = triangle.normal};
+    for (std::size_t i = 0; i < 3; ++i) placed.corners[i] = mesh_.corners()[triangle.corners[i]];
+    const double side = triangle.normal.dot(convex_.centre() - placed.corners[0]);
+    if (side < 0) {
+      if (mesh_.flaws().closed()) return;
+      placed.normal = -placed.normal;
+      std::swap(placed.corners[0], placed.corners[1]);
+    }
+    const PlacedConvex other(placed);
+    const double flat = Separation(convex_, other, placed.normal);
+    if (flat > reach_) return;
+    const ContactAxis over_face{placed.normal, flat, convex_.Support(-placed.normal), {}};
+    if (flat >= -margin_ && AddFlat(placed, over_face)) return;
+    const ContactAxis axis = FindContactAxis(convex_, other, reach_);
+    if (axis.separation > reach_) return;
+    if (flat >= axis.separation - margin_) {
+      AddFlat(placed, over_face);
+    } else if (EndsAlong(face, axis.normal)) {
+      for (const ContactPoint& point : PointsAlong(convex_, other, axis, reach_)) Add(point);
+    }
+  }
+
+  std::vector<ContactPoint> Take() {
+    std::vector<ContactPoint> taken;
+    for (Place& place : places_) {
+      std::vector<ContactPoint>& points = place.points;
+      const double deepest = std::ranges::min_element(points, {}, &ContactPoint::gap)->gap;
+      std::vector<ContactPoint> loaded;
+      for (const ContactPoint& point : points) {
+        if (point.gap <= deepest + kDeepest * size_) loaded.push_back(point);
+      }
+      const bool all = loaded.size() == points.size();
+      KeepOutline(loaded, size_);
+      KeepSome(loaded);
+      taken.insert(taken.end(), loaded.begin(), loaded.end());
+      if (all) continue;
+      KeepOutline(points, size_);
+      KeepSome(points);
+      for (const ContactPoint& point : points) {
+        if (point.gap > deepest + kDeepest * size_) taken.push_back(point);
+      }
+    }
+    if (taken.size() <= kMostMeshPoints) return taken;
+    std::ranges::stable_sort(taken, {}, &ContactPoint::gap);
+    taken.resize(kMostMeshPoints);
+    return taken;
+  }
+
+ private:
+  // Points on one flat place of the mesh, or on one flat face of the shape.
+  struct Place {
+    Vec3 normal;
+    double offset;
+    std::vector<ContactPoint> points;
+  };
+
+  void Add(const ContactPoint& point) {
+    const double offset = point.normal_W.dot(point.point_W) - point.gap;
+    for (Place& place : places_) {
+      if (place.normal.cross(point.normal_W).norm() > kOnePlane ||
+          place.normal.dot(point.normal_W) < 0 ||
+          std::abs(place.offset - offset) > kOnePlane * size_) {
+        continue;
+      }
+      place.points.push_back(point);
+      return;
+    }
+    places_.push_back({point.normal_W, offset, {point}});
+  }
+
+  bool AddFlat(const PlacedTriangle& triangle, const ContactAxis& axis) {
+    const Polygon border(triangle.corners.begin(), triangle.corners.end());
+    const double offset = axis.normal.dot(border[0]);
+    bool over = false;
+    for (const Polygon& polygon : convex_.Against(axis.normal)) {
+      for (const Vec3& of_core : ClipToBorder(polygon, border, axis.normal)) {
+        over = true;
+        const Vec3 point = of_core - convex_.radius() * axis.normal;
+        const double gap = axis.normal.dot(point) - offset;
+        if (gap <= reach_) {
+          Add({point, axis.normal, gap, convex_.RoundingAgainst(axis.normal)});
+        }
+      }
+    }
+    return over;
+  }
+
+  // Whether the surface ends in the triangle's edge or corner that lies furthest along `normal`: all
+  // that touches it there falls away.
+  bool EndsAlong(std::uint32_t face, const Vec3& normal) const {
+    const TriangleMesh::Face& triangle = mesh_.faces()[face];
+    std::array<double, 3> heights{};
+    for (std::size_t i = 0; i < 3; ++i) heights[i] = normal.dot(Corner(triangle.corners[i]));
+    const double highest = *std::ranges::max_element(heights);
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::size_t next = (i + 1) % 3;
+      if (std::min(heights[i], heights[next]) < highest - kWithin * size_) continue;
+      const std::uint32_t beyond = triangle.neighbours[i];
+      return beyond == TriangleMesh::kNone || FallsAway(beyond, triangle.corners[i], normal);
+    }
+    const auto top = std::ranges::max_element(heights) - heights.begin();
+    const std::uint32_t corner = triangle.corners[static_cast<std::size_t>(top)];
+    return std::ranges::all_of(mesh_.FacesAt(corner), [&](std::uint32_t touching) {
+      return FallsAway(touching, corner, normal);
+    });
+  }
+
+  bool FallsAway(std::uint32_t face, std::uint32_t corner, const Vec3& normal) const {
+    return std::ranges::all_of(mesh_.faces()[face].corners, [&](std::uint32_t other) {
+      const Vec3 along = Corner(other) - Corner(corner);
+      return normal.dot(along) <= kWithin * along.norm();
+    });
+  }
+
+  const Vec3& Corner(std::uint32_t corner) const { return mesh_.corners()[corner]; }
+
+  const PlacedConvex& convex_;
+  const TriangleMesh& mesh_;
+  double size_;
+  double reach_;
+  double margin_;
+  std::vector<Place> places_;
+};
+
+}  // namespace
+
+std::vector<ContactPoint> FindMeshContact(const Solid& first, const Pose& pose_WF,
+                                          const TriangleMesh& mesh, const Pose& pose_WM,
+                                          double reach_m) {
+  const Pose pose_MF = pose_WM.Inverse() * pose_WF;
+  const PlacedConvex convex(first, pose_MF);
+  const Ball ball = OuterBall(first.shape);
+  MeshContact contact(convex, mesh, 2 * ball.radius, reach_m);
+  mesh.tree().VisitNear(pose_MF * ball.centre, ball.radius + reach_m,
+                        [&](std::uint32_t face) { contact.Look(face); });
+  std::vector<ContactPoint> points = contact.Take();
+  for (ContactPoint& point : points) {
+    point.point_W = pose_WM * point.point_W;
+    point.normal_W = pose_WM.orientation * point.normal_W;
+  }
+  return points;
+}
+
+}  // namespace rikiseki::world

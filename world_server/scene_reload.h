@@ -1,0 +1,74 @@
+// Reads the scene again beside the running loop - when it is asked to, and when one of the files that
+// the scene was read from has changed - and puts it in the running one's place between two ticks.
+// Reading takes many ticks and happens in a thread of its own, which does nothing else.
+#pragma once
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "world_server/file_watch.h"
+#include "world_server/scene/sdf_loader.h"
+#include "world_server/settings.h"
+#include "world_server/step.h"
+
+namespace rikiseki::world {
+
+/// A scene and the dynamics that will run it.
+struct ReadyScene {
+  LoadedScene loaded;
+  std::unique_ptr<DynamicsWorld> dynamics;
+};
+
+/// What the settings name. Throws ConfigError, or std::invalid_argument where the engine refuses.
+ReadyScene LoadScene(const Settings& settings);
+
+/// What became of reading the scene again.
+struct ReloadReport {
+  bool replaced = false;  // another scene runs now
+  std::string refused;    // why the running one stays; else empty
+  std::vector<std::string> warnings;
+};
+
+class SceneReload {
+ public:
+  /// `files` are those that the running scene was read from; they are watched if the settings say so.
+  SceneReload(const Settings& settings, std::vector<std::string> files);
+  ~SceneReload();
+  SceneReload(const SceneReload&) = delete;
+  SceneReload& operator=(const SceneReload&) = delete;
+
+  /// Reads the scene again, and everything that moves starts anew. A second request while one is
+  /// under way starts another after it.
+  void Restart();
+
+  /// Puts what was read since the last call in the place of the running scene; nothing if nothing
+  /// was. Files that were changed and say the same as before change nothing and are no news.
+  std::optional<ReloadReport> Poll(WorldStep& step);
+
+ private:
+  struct Result {
+    Replacement how = Replacement::kChange;
+    std::optional<ReadyScene> ready;
+    std::string refused;
+  };
+
+  void Work();
+  Result Read(Replacement how);
+
+  const Settings settings_;
+  FileWatch watch_;  // of the thread alone
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool stop_ = false;             // under the mutex, as what follows
+  bool restart_ = false;          // asked for
+  std::optional<Result> result_;  // not yet taken
+  std::thread thread_;
+};
+
+}  // namespace rikiseki::world
