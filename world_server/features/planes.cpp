@@ -6,6 +6,7 @@
 
 #include "common/body_step.h"
 #include "world_server/features/curvature.h"
+#include "world_server/physics/soft_surface.h"
 
 namespace rikiseki::world {
 namespace {
@@ -20,6 +21,20 @@ bool Usable(const Vec3& v) {
 // Slower along its surface [m/s] a finger stays.
 constexpr double kStays = 1e-3;
 
+// The finger's spring and damper, or those that the surface brings, before a body that yields.
+void Soften(const SoftSurface& soft, const NearestPoint& nearest, const Finger& finger,
+            protocol::Plane& plane) {
+  const SoftSurface::Yield yield = soft.YieldAt(nearest.point, nearest.normal);
+  const bool brings = plane.stiffness > 0;
+  const SoftSurface::Spring felt = SoftSurface::InSeries(
+      {.stiffness_n_per_m = brings ? plane.stiffness : finger.stiffness_n_per_m,
+       .damping_ns_per_m = brings ? plane.damping : finger.damping_ns_per_m},
+      yield);
+  plane.stiffness = felt.stiffness_n_per_m;
+  plane.damping = felt.damping_ns_per_m;
+  plane.inverse_mass = yield.inverse_mass;
+}
+
 struct Candidate {
   double gap = 0;  // m, from the finger sphere's surface
   protocol::Plane plane;
@@ -29,8 +44,8 @@ struct Candidate {
 
 }  // namespace
 
-PlaneFinder::PlaneFinder(const Scene& scene)
-    : scene_(scene), near_(scene), linkages_(Linkage::Of(scene)) {
+PlaneFinder::PlaneFinder(const Scene& scene, const DynamicsWorld* dynamics)
+    : scene_(scene), dynamics_(dynamics), near_(scene), linkages_(Linkage::Of(scene)) {
   for (const SceneBody& body : scene.bodies) {
     inertias_.push_back(body.fixed ? BodyInertia() : BodyInertia::Of(body.mass_kg, body.inertia));
   }
@@ -62,7 +77,9 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
                         .radius_m = pointer.radius,
                         .position = ToVec3(pointer.position),
                         .velocity = ToVec3(pointer.velocity),
-                        .friction = friction};
+                        .friction = friction,
+                        .stiffness_n_per_m = tick.stiffness,
+                        .damping_ns_per_m = tick.damping};
     const bool sound = finger.pointer < protocol::kMaxPointers && finger.radius_m >= 0 &&
                        finger.radius_m <= kLargestFinger && Usable(finger.position) &&
                        Usable(finger.velocity);
@@ -102,15 +119,18 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
     for (const std::size_t body : bodies) {
       const SceneBody& scene_body = scene_.bodies[body];
       const BodyState& state = states[body];
+      const SoftSurface* soft = dynamics_ != nullptr ? dynamics_->FindSoft(body) : nullptr;
       const double body_way = scene_body.fixed ? 0 : near_.WayOf(body, state, time_s);
       for (std::size_t place = 0; place < scene_body.colliders.size(); ++place) {
         const Collider& collider = scene_body.colliders[place];
-        const Pose pose_WS = state.pose * collider.pose_BS;
+        const Pose pose_WS = soft != nullptr ? state.pose : state.pose * collider.pose_BS;
+        const Shape& shape = soft != nullptr ? soft->unloaded() : collider.shape;
+        Vec3 finger_S = pose_WS.Inverse() * finger.position;
+        if (soft != nullptr) finger_S = soft->WithoutDisplacement(finger_S);
         const TrackKey key = {finger.pointer, body, place};
         const auto known = tracks_.find(key);
         FeatureTrack track = known == tracks_.end() ? FeatureTrack() : std::move(known->second);
-        track.Find(collider.shape, pose_WS.Inverse() * finger.position, finger_reach + body_way,
-                   features);
+        track.Find(shape, finger_S, finger_reach + body_way, features);
         if (features.empty()) continue;
         const auto slots = track.Number(features, finger_reach + body_way);
         for (std::size_t i = 0; i < features.size(); ++i) {
@@ -136,10 +156,14 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .recovery_s = collider.recovery_s,
                          .inverse_mass = Mobility(states, body, point, normal)};
           const Vec3 along = relative - relative.dot(normal) * normal;
-          found.plane.radius =
-              RadiusAlong(collider.shape, features[i],
-                          along.norm() > kStays ? Vec3(pose_WS.orientation.conjugate() * along)
-                                                : Vec3(Vec3::Zero()));
+          if (soft != nullptr) {
+            Soften(*soft, features[i], finger, found.plane);
+          } else {
+            found.plane.radius =
+                RadiusAlong(collider.shape, features[i],
+                            along.norm() > kStays ? Vec3(pose_WS.orientation.conjugate() * along)
+                                                  : Vec3(Vec3::Zero()));
+          }
           if (finger.friction > 0 && collider.friction > 0) {
             const double static_friction = collider.static_friction.value_or(collider.friction);
             found.plane.dynamic_friction = std::sqrt(finger.friction * collider.friction);

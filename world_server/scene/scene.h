@@ -78,6 +78,16 @@ struct Collider {
   bool operator==(const Collider&) const = default;
 };
 
+/// What a body that deforms is made of; its mass is spread evenly over its one collider.
+struct Softness {
+  double youngs_modulus_pa = 0;
+  double poisson_ratio = 0.3;
+  double relaxation_s = 0.02;  // damping: stress = C (strain + relaxation strain rate)
+  double element_m = 0;        // edge of the tetrahedra, roughly
+
+  bool operator==(const Softness&) const = default;
+};
+
 struct SceneBody {
   std::string name;  // "model::link"
   bool fixed = false;
@@ -92,6 +102,7 @@ struct SceneBody {
   // Links of one model pass through each other unless one of them says otherwise; 0 = of none.
   std::uint32_t model = 0;
   bool self_collides = false;
+  std::optional<Softness> softness = {};  // none: rigid
 
   bool operator==(const SceneBody&) const = default;
 };

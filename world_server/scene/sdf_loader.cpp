@@ -247,6 +247,7 @@ class Loader {
     }
     for (const SdfJoint& joint : joints_) AddJoint(joint);
     RequireShapes();
+    CheckSoftLinks();
   }
 
  private:
@@ -304,6 +305,7 @@ class Loader {
       }
       body.colliders.push_back(collider);
     }
+    ReadSoftness(link->Element(), body);
     return body;
   }
 
@@ -321,6 +323,9 @@ class Loader {
   void Merge(std::size_t place, const SceneBody& link, std::size_t into) {
     SceneBody& body = loaded_.scene.bodies[into];
     const sdf::Link& source = *sources_[place].link;
+    for (const SceneBody* soft : {&body, &link}) {
+      if (soft->softness) RefuseJointed(source.Element(), soft->name);
+    }
     if (link.falls != body.falls) {
       Refuse(source.Element(), "link " + link.name + " is fixed to link " + body.name +
                                    ", and <gravity> acts on one of them only; give both the same");
@@ -365,6 +370,29 @@ class Loader {
                                  " can move and has no collision; give it one, or make its model "
                                  "static");
     }
+  }
+
+  void CheckSoftLinks() {
+    const Scene& scene = loaded_.scene;
+    const auto rigid = std::find_if(scene.bodies.begin(), scene.bodies.end(),
+                                    [](const auto& body) { return !body.fixed && !body.softness; });
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+      const SceneBody& body = scene.bodies[i];
+      if (!body.softness) continue;
+      if (IsJointed(scene, i)) RefuseJointed(element_of_[i], body.name);
+      RequireHeld(element_of_[i], scene, body);
+      if (rigid == scene.bodies.end()) continue;
+      loaded_.warnings.push_back(PlaceOfSoftness(element_of_[i]) + ": soft link " + body.name +
+                                 " and rigid links that move, as " + rigid->name +
+                                 ", pass through each other");
+    }
+  }
+
+  [[noreturn]] static void RefuseJointed(const sdf::ElementPtr& link, const std::string& name) {
+    Refuse(link,
+           "link " + name +
+               " is soft, and a joint holds it; joints hold rigid links only: a soft one is held "
+               "by static models that it touches");
   }
 
   struct Source {
