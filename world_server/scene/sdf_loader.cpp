@@ -323,7 +323,7 @@ class Loader {
   void Merge(std::size_t place, const SceneBody& link, std::size_t into) {
     SceneBody& body = loaded_.scene.bodies[into];
     const sdf::Link& source = *sources_[place].link;
-    for (const SceneBody* soft : {&body, &link}) {
+    for (const SceneBody* soft : {static_cast<const SceneBody*>(&body), &link}) {
       if (soft->softness) RefuseJointed(source.Element(), soft->name);
     }
     if (link.falls != body.falls) {
