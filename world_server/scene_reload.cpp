@@ -3,7 +3,7 @@
 #include <chrono>
 #include <utility>
 
-#include "world_server/physics/bullet_world.h"
+#include "world_server/physics/deformable_world.h"
 
 namespace rikiseki::world {
 namespace {
@@ -17,7 +17,7 @@ ReadyScene LoadScene(const Settings& settings) {
   ReadyScene ready;
   ready.loaded = LoadSdf(settings.scene.file);
   ready.dynamics =
-      std::make_unique<BulletWorld>(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
+      MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
   return ready;
 }
 

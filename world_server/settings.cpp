@@ -13,7 +13,7 @@ void Bind(ConfigSchema& schema, Settings& settings) {
   schema.Flag("scene.watch", &settings.scene.watch,
               "whether the running scene follows its files as they are edited");
   schema.Number("physics.substep_ms", &settings.physics.substep_ms, 0.05, 10,
-                "longest step of the rigid-body engine: stacks need 1, lone bodies bear 5");
+                "longest step of bodies that a push reaches; the others choose theirs by themselves");
   schema.Choice<protocol::Coupling>(
       "coupling.coupling", &settings.coupling.coupling,
       {{"position", protocol::Coupling::kPosition},

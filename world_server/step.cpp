@@ -16,8 +16,9 @@ namespace rikiseki::world {
 namespace {
 
 // Substeps that are taken back when another engine goes on: they find the impulses by which bodies
-// at rest carry each other, which the engine before knew.
-constexpr int kWarmUp = 4;
+// at rest carry each other, which the engine before knew. A stack of ten moves by 2.6 um without them,
+// by 1.3 um with 4, by less than 1 um with 12.
+constexpr int kWarmUp = 12;
 
 }  // namespace
 
@@ -62,7 +63,7 @@ void WorldStep::State::Adopt(Scene new_scene, std::unique_ptr<DynamicsWorld> new
   scene = std::move(new_scene);
   dynamics = std::move(new_dynamics);
   numbers.Advance(changes);
-  auto finder = std::make_unique<PlaneFinder>(scene);
+  auto finder = std::make_unique<PlaneFinder>(scene, dynamics.get());
   if (plane_finder) finder->Continue(*plane_finder, changes);
   plane_finder = std::move(finder);
   GoOn(changes);
@@ -118,7 +119,8 @@ void WorldStep::State::Penalise(double period_s) {
     kicks = PenaltyKicks(scene, states, fingers,
                          {.stiffness_n_per_m = stiffness_n_per_m,
                           .period_s = period_s,
-                          .largest_impulse_ns = settings.coupling.force_cap_n * gap_s});
+                          .largest_impulse_ns = settings.coupling.force_cap_n * gap_s},
+                         dynamics.get());
   }
   Vec3 penalty = ToVec3(health.penalty_impulse);
   for (const Kick& kick : kicks) penalty += kick.impulse;

@@ -125,6 +125,14 @@ HalfSpace FeatureTrack::Interpolated(const Feature& feature) const noexcept {
   return shown;
 }
 
+// Of a surface's own stiffness or damping, which never goes beyond what a frame said. 0 is none of its
+// own, and not a little.
+double FeatureTrack::Interpolated(double previous, double last) const noexcept {
+  if (rule_ != DisplayRule::kInterpolate || !(previous > 0) || !(last > 0)) return last;
+  const double fraction = std::min(static_cast<double>(tick_) / ticks_per_frame_, 1.0);
+  return fraction < 1 ? previous + fraction * (last - previous) : last;
+}
+
 HalfSpace FeatureTrack::Displayed(const Feature& feature) const noexcept {
   const HalfSpace shown = Interpolated(feature);
   return feature.rides ? InWorld(feature.pose_WB, shown) : shown;
@@ -194,12 +202,16 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
       if (feature.rides) now = InWorld(feature.pose_WB.Inverse(), now);
       feature.previous_point = now.point;
       feature.previous_normal = now.normal;
+      feature.previous_stiffness = Interpolated(known.previous_stiffness, known.identity.stiffness);
+      feature.previous_damping = Interpolated(known.previous_damping, known.identity.damping);
       feature.recovery = known.recovery;
       feature.recovery_left = known.recovery_left;
       feature.strength = known.strength;
     } else {
       feature.previous_point = feature.last_point;
       feature.previous_normal = feature.last_normal;
+      feature.previous_stiffness = plane.stiffness;
+      feature.previous_damping = plane.damping;
       const HalfSpace last{feature.last_point, feature.last_normal};
       HalfSpace shown = feature.rides ? InWorld(feature.pose_WB, last) : last;
       if (plane.radius > 0) {
@@ -229,6 +241,10 @@ void FeatureTrack::Receive(const protocol::WorldFrame& frame, std::span<const Fi
     feature = known;
     feature.previous_point = feature.last_point = now.point;
     feature.previous_normal = feature.last_normal = now.normal;
+    feature.previous_stiffness = feature.identity.stiffness =
+        Interpolated(known.previous_stiffness, known.identity.stiffness);
+    feature.previous_damping = feature.identity.damping =
+        Interpolated(known.previous_damping, known.identity.damping);
     feature.leaving = true;
   }
   std::copy_n(incoming_.begin(), count, features_.begin());
@@ -268,8 +284,8 @@ std::span<const Surface> FeatureTrack::Surfaces(const LocalBodies& copies) noexc
         feature.identity.static_friction > 0 || feature.identity.dynamic_friction > 0;
     const BodyState* copy =
         feature.rides && is_rough ? copies.Find(surface.body, surface.generation) : nullptr;
-    surface.stiffness = feature.identity.stiffness;
-    surface.damping = feature.identity.damping;
+    surface.stiffness = Interpolated(feature.previous_stiffness, feature.identity.stiffness);
+    surface.damping = Interpolated(feature.previous_damping, feature.identity.damping);
     surface.static_friction = feature.identity.static_friction;
     surface.dynamic_friction = feature.identity.dynamic_friction;
     surface.strength = feature.strength;

@@ -64,7 +64,8 @@ class FeatureTrack {
 
  private:
   struct Feature {
-    protocol::Plane identity;         // and own stiffness
+    protocol::Plane identity;         // and own stiffness and damping: the last ones
+    double previous_stiffness = 0, previous_damping = 0;
     bool rides = false;               // points and normals below are in the body's frame, else in W
     Pose pose_WB;                     // where its copy was last
     Vec3 previous_point, last_point;  // of a ball: its centre
@@ -77,6 +78,7 @@ class FeatureTrack {
 
   void FollowCopies(const LocalBodies& copies) noexcept;
   HalfSpace Interpolated(const Feature& feature) const noexcept;
+  double Interpolated(double previous, double last) const noexcept;
   HalfSpace Displayed(const Feature& feature) const noexcept;
   HalfSpace DisplayedTo(const Feature& feature, const Vec3& finger) const noexcept;
   bool IsPressed(const Feature& feature, const FingerState& finger) const noexcept;

@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kHapticPeriod = 1e-3;    // s
 constexpr double kAfter = 0.5;            // s, at home again
-constexpr double kCubeHalf = 0.03;        // m
 constexpr double kFriction = 0.3;         // of cube and floor
 constexpr std::size_t kBeforeTouch = 50;  // ticks
 constexpr std::size_t kTouchTicks = 1000;
@@ -43,12 +42,7 @@ world::Settings WorldSettings(const BuzzRun& run) {
   return settings;
 }
 
-world::Scene CubeOnFloor(double mass_kg) {
-  world::SceneBody cube;
-  cube.name = "cube";
-  cube.mass_kg = mass_kg;
-  cube.inertia = Mat3::Identity() * (mass_kg * 2 * kCubeHalf * kCubeHalf / 3);
-  cube.colliders.push_back({.shape = world::Box{Vec3::Constant(kCubeHalf)}, .friction = kFriction});
+world::Scene OnFloor(PushedShape shape, double mass_kg) {
   world::SceneBody floor;
   floor.name = "floor";
   floor.fixed = true;
@@ -56,7 +50,7 @@ world::Scene CubeOnFloor(double mass_kg) {
   floor.colliders.push_back({.shape = world::HalfSpace{}, .friction = kFriction});
   world::Scene scene;
   scene.name = "light";
-  scene.bodies = {cube, floor};
+  scene.bodies = {MakePushed(shape, mass_kg, kFriction, Vec3::Zero()), floor};
   return scene;
 }
 
@@ -101,7 +95,7 @@ haptic::HandSettings HandThat(const Touch& touch) {
 std::vector<double> SimulateBuzz(const BuzzRun& run) {
   const haptic::Settings haptic_settings = HapticSettings(run);
   const world::Settings world_settings = WorldSettings(run);
-  const world::Scene scene = CubeOnFloor(run.mass_kg);
+  const world::Scene scene = OnFloor(run.shape, run.mass_kg);
   const std::unique_ptr<haptic::Device> device = haptic::MakeDevice(haptic_settings);
   CoupledRun loops(
       haptic_settings, *device, world_settings, scene,

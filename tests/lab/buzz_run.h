@@ -8,6 +8,7 @@
 
 #include "haptic_server/settings.h"
 #include "protocol/messages.h"
+#include "tests/lab/pushed_shape.h"
 
 namespace rikiseki::lab {
 
@@ -33,6 +34,7 @@ inline const Touch kSlideTouch = {"slide", {-20, 0, 46}, {25, 0, -9}, 500, 100, 
 
 struct BuzzRun {
   Touch touch = kPushTouch;
+  PushedShape shape = PushedShape::kCube;
   double mass_kg = 0.02;
   std::optional<protocol::Coupling> coupling = {};  // none: a single rate
   double world_period_s = 0.05;

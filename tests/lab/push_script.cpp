@@ -49,15 +49,6 @@ world::SceneBody Body(const char* name, const world::Shape& shape, const Vec3& p
   return body;
 }
 
-world::SceneBody Cube(const char* name, double x, double mass_kg, double friction) {
-  world::SceneBody cube =
-      Body(name, world::Box{Vec3::Constant(kCubeHalf)}, Vec3(x, 0, kCubeHalf), friction);
-  cube.fixed = false;
-  cube.mass_kg = mass_kg;
-  cube.inertia = Mat3::Identity() * (mass_kg * 2 * kCubeHalf * kCubeHalf / 3);
-  return cube;
-}
-
 }  // namespace
 
 double Duration(const CubePush& push) {
@@ -91,14 +82,15 @@ Vec3 FingerPosition(const CubePush& push, const Vec3& cube, double t_s) {
 world::Scene PushScene(const CubePush& push) {
   world::Scene scene;
   scene.name = "push";
-  scene.bodies.push_back(Cube("cube", 0, push.mass_kg, push.friction));
+  scene.bodies.push_back(MakePushed(push.shape, push.mass_kg, push.friction, {0, 0, kCubeHalf}));
   scene.bodies.push_back(Body("floor", world::HalfSpace{}, Vec3::Zero(), push.friction));
   if (push.script == PushScript::kWall) {
     const Vec3 position(kCubeHalf + push.gap_m + kWallHalf.x(), 0, kWallHalf.z());
     scene.bodies.push_back(Body("wall", world::Box{kWallHalf}, position, push.friction));
   } else if (push.script == PushScript::kNeighbour) {
-    scene.bodies.push_back(
-        Cube("neighbour", 2 * kCubeHalf + push.gap_m, push.neighbour_kg, push.friction));
+    scene.bodies.push_back(MakePushed(PushedShape::kCube, push.neighbour_kg, push.friction,
+                                      {2 * kCubeHalf + push.gap_m, 0, kCubeHalf}));
+    scene.bodies.back().name = "neighbour";
   }
   return scene;
 }

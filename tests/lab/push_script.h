@@ -3,11 +3,11 @@
 #pragma once
 
 #include "common/geometry.h"
+#include "tests/lab/pushed_shape.h"
 #include "world_server/scene/scene.h"
 
 namespace rikiseki::lab {
 
-inline constexpr double kCubeHalf = 0.03;      // m
 inline constexpr double kFingerRadius = 0.01;  // m
 
 enum class PushScript {
@@ -24,6 +24,7 @@ enum class PushScript {
 /// What is pushed, and how.
 struct CubePush {
   PushScript script = PushScript::kPush;
+  PushedShape shape = PushedShape::kCube;
   double mass_kg = 1;
   double friction = 0.3;  // of all pairs
   double stiffness_n_per_m = 2000;
@@ -39,7 +40,7 @@ double Duration(const CubePush& push);
 /// The centre of the finger [m, in W] at `t_s` >= 0; `cube` is where the cube's centre rests.
 Vec3 FingerPosition(const CubePush& push, const Vec3& cube, double t_s);
 
-/// Body 0 is the cube, body 1 the floor; body 2, if the script has one, the wall or the neighbour.
+/// Body 0 is the cube, or what stands in its place, body 1 the floor; body 2, if the script has one, the wall or the neighbour.
 world::Scene PushScene(const CubePush& push);
 
 }  // namespace rikiseki::lab

@@ -13,7 +13,7 @@
 #include "protocol/impulse_units.h"
 #include "tests/lab/coupled_run.h"
 #include "tests/lab/ideal_device.h"
-#include "world_server/physics/bullet_world.h"
+#include "world_server/physics/deformable_world.h"
 
 namespace rikiseki::lab {
 namespace {
@@ -190,7 +190,7 @@ StirResult SimulateStir(const Stir& stir) {
                      CoupledRun::StartNs(haptic_settings) + lead * haptic_settings.period_ns());
   CoupledRun run(
       haptic_settings, device, world_settings, stir.scene,
-      std::make_unique<world::BulletWorld>(stir.scene, world_settings.physics.substep_ms * 1e-3),
+      world::MakeDynamics(stir.scene, world_settings.physics.substep_ms * 1e-3),
       /*phase_ticks=*/0);
   Watch watch(stir.scene, haptic_settings, run);
   for (long long k = 0; k < lead + ticks(script_s); ++k) {

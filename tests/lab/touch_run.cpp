@@ -12,7 +12,7 @@
 #include "protocol/codec.h"
 #include "tests/lab/coupled_run.h"
 #include "tests/lab/ideal_device.h"
-#include "world_server/physics/bullet_world.h"
+#include "world_server/physics/deformable_world.h"
 #include "world_server/step.h"
 
 namespace rikiseki::lab {
@@ -115,8 +115,8 @@ Touch TouchOf(const world::Scene& scene) {
   // The world itself says where the nearest point is, seen from afar.
   world::Settings wide = touch.world;
   wide.features.radius_mm = 1e6;
-  world::WorldStep world(
-      wide, scene, std::make_unique<world::BulletWorld>(scene, wide.physics.substep_ms * 1e-3), 0);
+  world::WorldStep world(wide, scene, world::MakeDynamics(scene, wide.physics.substep_ms * 1e-3),
+                         0);
   world.BeginHapticEpoch(1);
   protocol::HapticTick finger;
   finger.pointer_count = 1;
@@ -148,10 +148,9 @@ TouchResult RunTouch(const Touch& touch) {
   IdealDevice hand(haptic::Hand([&touch](double t_s) { return HandTarget(touch, t_s); }, kHand),
                    CoupledRun::StartNs(touch.haptic) + ticks(kLead) * period_ns);
   TurnedDevice device(hand, touch.haptic.mapping);
-  CoupledRun run(
-      touch.haptic, device, touch.world, touch.scene,
-      std::make_unique<world::BulletWorld>(touch.scene, touch.world.physics.substep_ms * 1e-3),
-      /*phase_ticks=*/0);
+  CoupledRun run(touch.haptic, device, touch.world, touch.scene,
+                 world::MakeDynamics(touch.scene, touch.world.physics.substep_ms * 1e-3),
+                 /*phase_ticks=*/0);
   if (touch.alter_frame) run.AlterFrames(touch.alter_frame);
   for (long long k = 0; k < ticks(kLead); ++k) {
     run.Tick({.clutch = touch.clutches_first && k > 0 && k < 10});

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "world_server/physics/bullet_world.h"
+#include "world_server/physics/deformable_world.h"
 #include "world_server/scene/needs.h"
 #include "world_server/scene/sdf_loader.h"
 #include "world_server/step.h"
@@ -60,7 +60,7 @@ TEST_CASE("two seconds of each scene with a finger in it: finite, and slower tha
     const int frames = large && std::getenv("RIKISEKI_FULL") == nullptr ? 2 : 40;
     Settings settings;
     settings.features.radius_mm = 100;  // wherever things have rolled meanwhile
-    WorldStep step(settings, scene, std::make_unique<BulletWorld>(scene, 1e-3), 0);
+    WorldStep step(settings, scene, MakeDynamics(scene, 1e-3), 0);
     protocol::HapticTick tick;
     tick.tick = 1;
     tick.pointer_count = 1;

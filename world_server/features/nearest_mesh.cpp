@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 
+#include "world_server/geometry/triangle.h"
+
 namespace rikiseki::world {
 namespace {
 
@@ -15,9 +17,9 @@ constexpr double kLift = 1e-8;       // of the size, off the surface
 constexpr double kSlack = 1e-6;      // of a cosine
 const double kParallel = std::cos(5 * std::numbers::pi / 180);
 
-// Where a triangle is nearest, and on which part of it: its face, an edge, or a corner.
+// Where a triangle of a mesh is nearest, and on which part of it.
 struct Foot {
-  enum class Part { kFace, kEdge, kCorner };
+  using Part = TriangleFoot::Part;
 
   Vec3 point = Vec3::Zero();
   Part part = Part::kFace;
@@ -25,34 +27,16 @@ struct Foot {
   std::uint32_t face = 0;
 };
 
-// Regions after C. Ericson, Real-Time Collision Detection, 5.1.5; each foot by its own formula.
 Foot FootOn(const TriangleMesh& mesh, std::uint32_t face, const Vec3& p) {
-  using Part = Foot::Part;
   const TriangleMesh::Face& triangle = mesh.faces()[face];
   const Vec3& a = mesh.corners()[triangle.corners[0]];
-  const Vec3& b = mesh.corners()[triangle.corners[1]];
-  const Vec3& c = mesh.corners()[triangle.corners[2]];
-  const Vec3 ab = b - a, ac = c - a, bc = c - b;
-  const Vec3 ap = p - a, bp = p - b, cp = p - c;
-  const double ab_a = ab.dot(ap), ac_a = ac.dot(ap);
-  if (ab_a <= 0 && ac_a <= 0) return {a, Part::kCorner, 0, face};
-  const double ab_b = ab.dot(bp), ac_b = ac.dot(bp);
-  if (ab_b >= 0 && ac_b <= ab_b) return {b, Part::kCorner, 1, face};
-  const double ab_c = ab.dot(cp), ac_c = ac.dot(cp);
-  if (ac_c >= 0 && ab_c <= ac_c) return {c, Part::kCorner, 2, face};
-  const double beyond_ab = ab_a * ac_b - ab_b * ac_a;
-  if (beyond_ab <= 0 && ab_a >= 0 && ab_b <= 0) {
-    return {a + std::clamp(ab_a / ab.squaredNorm(), 0.0, 1.0) * ab, Part::kEdge, 0, face};
-  }
-  const double beyond_ca = ab_c * ac_a - ab_a * ac_c;
-  if (beyond_ca <= 0 && ac_a >= 0 && ac_c <= 0) {
-    return {a + std::clamp(ac_a / ac.squaredNorm(), 0.0, 1.0) * ac, Part::kEdge, 2, face};
-  }
-  const double beyond_bc = ab_b * ac_c - ab_c * ac_b;
-  if (beyond_bc <= 0 && ac_b - ab_b >= 0 && ab_c - ac_c >= 0) {
-    return {b + std::clamp(bc.dot(bp) / bc.squaredNorm(), 0.0, 1.0) * bc, Part::kEdge, 1, face};
-  }
-  return {p - triangle.normal.dot(ap) * triangle.normal, Part::kFace, 0, face};
+  const TriangleFoot foot = FootOnTriangle(a, mesh.corners()[triangle.corners[1]],
+                                           mesh.corners()[triangle.corners[2]], p);
+  // Along the normal it is exact to rounding however large the face is.
+  const Vec3 point = foot.part == Foot::Part::kFace
+                         ? Vec3(p - triangle.normal.dot(p - a) * triangle.normal)
+                         : foot.point;
+  return {point, foot.part, foot.index, face};
 }
 
 std::uint32_t CornerOf(const TriangleMesh& mesh, const Foot& foot) {
@@ -198,14 +182,15 @@ bool MayFace(const TriangleMesh& mesh, std::uint32_t node, const Vec3& p) {
   if (cone.half_angle >= std::numbers::pi / 2) return true;
   const Bounds& bounds = mesh.tree().nodes()[node].bounds;
   const Vec3 towards = p - (bounds.low + bounds.high) / 2;
-  const double radius = (bounds.high - bounds.low).norm() / 2;
-  const double distance = towards.norm();
-  if (distance <= radius) return true;
-  // Both angles are below a right one; together they may reach beyond it.
-  const double sine = radius / distance;
-  const double cosine = std::sqrt((1 - sine) * (1 + sine));
-  const double least = cone.cosine * cosine - cone.sine * sine;
-  return cone.axis.dot(towards) >= (least - kSlack) * distance;
+  const double squared_radius = (bounds.high - bounds.low).squaredNorm() / 4;
+  const double squared_tangent = towards.squaredNorm() - squared_radius;
+  if (squared_tangent <= 0) return true;
+  // Both angles, of the cone and of the ball about the node as p sees it, are below a right one;
+  // together they may reach beyond it.
+  const double radius = std::sqrt(squared_radius);
+  const double tangent = std::sqrt(squared_tangent);
+  return cone.axis.dot(towards) >=
+         cone.cosine * tangent - cone.sine * radius - kSlack * (tangent + radius);
 }
 
 void FindMinima(const TriangleMesh& mesh, const Vec3& p, double radius,

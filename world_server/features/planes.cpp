@@ -5,6 +5,8 @@
 #include <tuple>
 
 #include "common/body_step.h"
+#include "world_server/features/curvature.h"
+#include "world_server/physics/soft_surface.h"
 
 namespace rikiseki::world {
 namespace {
@@ -16,12 +18,21 @@ bool Usable(const Vec3& v) {
   return v.allFinite() && v.cwiseAbs().maxCoeff() <= kFarthest;
 }
 
-// 1/M_eff of the body at a point along a direction; 0 = it cannot move.
-double Mobility(const SceneBody& body, const BodyState& state, const Vec3& point,
-                const Vec3& direction) {
-  if (body.fixed) return 0;
-  return InverseEffectiveMass(BodyInertia::Of(body.mass_kg, body.inertia), state.pose, point,
-                              direction);
+// Slower along its surface [m/s] a finger stays.
+constexpr double kStays = 1e-3;
+
+// The finger's spring and damper, or those that the surface brings, before a body that yields.
+void Soften(const SoftSurface& soft, const NearestPoint& nearest, const Finger& finger,
+            protocol::Plane& plane) {
+  const SoftSurface::Yield yield = soft.YieldAt(nearest.point, nearest.normal);
+  const bool brings = plane.stiffness > 0;
+  const SoftSurface::Spring felt = SoftSurface::InSeries(
+      {.stiffness_n_per_m = brings ? plane.stiffness : finger.stiffness_n_per_m,
+       .damping_ns_per_m = brings ? plane.damping : finger.damping_ns_per_m},
+      yield);
+  plane.stiffness = felt.stiffness_n_per_m;
+  plane.damping = felt.damping_ns_per_m;
+  plane.inverse_mass = yield.inverse_mass;
 }
 
 struct Candidate {
@@ -33,6 +44,31 @@ struct Candidate {
 
 }  // namespace
 
+PlaneFinder::PlaneFinder(const Scene& scene, const DynamicsWorld* dynamics)
+    : scene_(scene), dynamics_(dynamics), near_(scene), linkages_(Linkage::Of(scene)) {
+  for (const SceneBody& body : scene.bodies) {
+    inertias_.push_back(body.fixed ? BodyInertia() : BodyInertia::Of(body.mass_kg, body.inertia));
+  }
+  for (std::size_t i = 0; i < linkages_.size(); ++i) {
+    const std::vector<std::size_t>& bodies = linkages_[i].bodies();
+    for (std::size_t place = 0; place < bodies.size(); ++place) linked_[bodies[place]] = {i, place};
+  }
+}
+
+// 1/M_eff of the body at a point against its normal, as its joints leave it; 0 = it cannot move.
+double PlaneFinder::Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                             const Vec3& normal) const {
+  if (scene_.bodies[body].fixed) return 0;
+  const auto linked = linked_.find(body);
+  if (linked == linked_.end()) {
+    return InverseEffectiveMass(inertias_[body], states[body].pose, point, normal);
+  }
+  const auto [linkage, place] = linked->second;
+  std::vector<BodyState> members;
+  for (const std::size_t member : linkages_[linkage].bodies()) members.push_back(states[member]);
+  return linkages_[linkage].InverseEffectiveMass(members, place, point, normal);
+}
+
 std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction) {
   std::vector<Finger> fingers;
   const std::size_t count = std::min(tick.pointer_count, protocol::kMaxPointers);
@@ -41,7 +77,9 @@ std::vector<Finger> FingersOf(const protocol::HapticTick& tick, double friction)
                         .radius_m = pointer.radius,
                         .position = ToVec3(pointer.position),
                         .velocity = ToVec3(pointer.velocity),
-                        .friction = friction};
+                        .friction = friction,
+                        .stiffness_n_per_m = tick.stiffness,
+                        .damping_ns_per_m = tick.damping};
     const bool sound = finger.pointer < protocol::kMaxPointers && finger.radius_m >= 0 &&
                        finger.radius_m <= kLargestFinger && Usable(finger.position) &&
                        Usable(finger.velocity);
@@ -81,21 +119,25 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
     for (const std::size_t body : bodies) {
       const SceneBody& scene_body = scene_.bodies[body];
       const BodyState& state = states[body];
+      const SoftSurface* soft = dynamics_ != nullptr ? dynamics_->FindSoft(body) : nullptr;
       const double body_way = scene_body.fixed ? 0 : near_.WayOf(body, state, time_s);
       for (std::size_t place = 0; place < scene_body.colliders.size(); ++place) {
         const Collider& collider = scene_body.colliders[place];
-        const Pose pose_WS = state.pose * collider.pose_BS;
+        const Pose pose_WS = soft != nullptr ? state.pose : state.pose * collider.pose_BS;
+        const Shape& shape = soft != nullptr ? soft->unloaded() : collider.shape;
+        Vec3 finger_S = pose_WS.Inverse() * finger.position;
+        if (soft != nullptr) finger_S = soft->WithoutDisplacement(finger_S);
         const TrackKey key = {finger.pointer, body, place};
         const auto known = tracks_.find(key);
         FeatureTrack track = known == tracks_.end() ? FeatureTrack() : std::move(known->second);
-        track.Find(collider.shape, pose_WS.Inverse() * finger.position, finger_reach + body_way,
-                   features);
+        track.Find(shape, finger_S, finger_reach + body_way, features);
         if (features.empty()) continue;
         const auto slots = track.Number(features, finger_reach + body_way);
         for (std::size_t i = 0; i < features.size(); ++i) {
           const Vec3 point = pose_WS * features[i].point;
           const Vec3 surface_velocity = state.VelocityAt(point);
-          const double speed = (finger.velocity - surface_velocity).norm();
+          const Vec3 relative = finger.velocity - surface_velocity;
+          const double speed = relative.norm();
           const double gap = features[i].distance - finger.radius_m;
           if (!(gap <= reach.radius_m + time_s * speed) || !point.allFinite()) continue;
 
@@ -112,9 +154,15 @@ std::uint32_t PlaneFinder::Find(std::span<const BodyState> states,
                          .damping = collider.damping_ns_per_m.value_or(0),
                          .velocity = ToArray(surface_velocity),
                          .recovery_s = collider.recovery_s,
-                         .inverse_mass = Mobility(scene_body, state, point, normal)};
-          if (const auto* ball = std::get_if<Sphere>(&collider.shape)) {
-            found.plane.radius = ball->radius;
+                         .inverse_mass = Mobility(states, body, point, normal)};
+          const Vec3 along = relative - relative.dot(normal) * normal;
+          if (soft != nullptr) {
+            Soften(*soft, features[i], finger, found.plane);
+          } else {
+            found.plane.radius =
+                RadiusAlong(collider.shape, features[i],
+                            along.norm() > kStays ? Vec3(pose_WS.orientation.conjugate() * along)
+                                                  : Vec3(Vec3::Zero()));
           }
           if (finger.friction > 0 && collider.friction > 0) {
             const double static_friction = collider.static_friction.value_or(collider.friction);

@@ -1,6 +1,6 @@
 // The planes that the haptic side renders: for every finger and every shape near it the tangent
 // plane at the shape's nearest point - of a mesh at each near point - normal towards the finger.
-// Paper 3.1.
+// Paper 3.1. Of a soft body the plane that the finger does not move (soft_surface.h).
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 #include "world_server/features/feature_track.h"
 #include "world_server/features/near_bodies.h"
 #include "world_server/physics/dynamics_world.h"
+#include "world_server/physics/linkage.h"
 #include "world_server/scene/scene.h"
 #include "world_server/scene/scene_change.h"
 
@@ -32,6 +33,8 @@ struct Finger {
   Vec3 position = Vec3::Zero();  // of the sphere's centre, in W
   Vec3 velocity = Vec3::Zero();  // m/s
   double friction = 0;           // Coulomb, dynamic; 0 = none
+  double stiffness_n_per_m = 0;  // that it renders surfaces with which bring none of their own,
+  double damping_ns_per_m = 0;   // and the damping
 };
 
 inline constexpr double kLargestFinger = 1.0;  // m
@@ -50,8 +53,8 @@ static_assert(protocol::kMaxColliders <= 1 << 16 && FeatureTrack::kMaxSlots <= 1
 /// Finds the planes of one scene, frame after frame.
 class PlaneFinder {
  public:
-  /// `scene` outlives this.
-  explicit PlaneFinder(const Scene& scene) : scene_(scene), near_(scene) {}
+  /// `scene` outlives this, and so do the dynamics, which know the surfaces of its soft bodies.
+  explicit PlaneFinder(const Scene& scene, const DynamicsWorld* dynamics = nullptr);
 
   /// Goes on with what `before` knows of the features of bodies that are the same.
   void Continue(const PlaneFinder& before, std::span<const BodyChange> changes);
@@ -66,9 +69,16 @@ class PlaneFinder {
  private:
   using TrackKey = std::array<std::size_t, 3>;  // pointer, body, collider
 
+  double Mobility(std::span<const BodyState> states, std::size_t body, const Vec3& point,
+                  const Vec3& normal) const;
+
   const Scene& scene_;
+  const DynamicsWorld* dynamics_;
   NearBodies near_;
-  std::map<TrackKey, FeatureTrack> tracks_;  // of the last frame
+  std::vector<BodyInertia> inertias_;  // of the bodies that can move
+  std::vector<Linkage> linkages_;
+  std::map<std::size_t, std::array<std::size_t, 2>> linked_;  // bodies: linkage, place in it
+  std::map<TrackKey, FeatureTrack> tracks_;                   // of the last frame
 };
 
 }  // namespace rikiseki::world

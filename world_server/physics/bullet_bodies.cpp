@@ -50,8 +50,10 @@ void MovingBody::SetState(const BodyState& state) {
 BulletBodies::BulletBodies(const Scene& scene) {
   smallest = std::numeric_limits<double>::infinity();
   for (const SceneBody& body : scene.bodies) {
-    body.fixed ? AddFixed(body) : AddMoving(body, scene.gravity);
+    body.fixed ? AddFixed(body)
+               : AddMoving(body, scene.gravity, IsJointed(scene, moving_of.size()));
   }
+  if (!std::isfinite(smallest)) smallest = 1;  // nothing that moves has a shape
 }
 
 void BulletBodies::AddFixed(const SceneBody& body) {
@@ -64,14 +66,14 @@ void BulletBodies::AddFixed(const SceneBody& body) {
   moving_of.push_back(kFixed);
 }
 
-void BulletBodies::AddMoving(const SceneBody& body, const Vec3& gravity) {
+void BulletBodies::AddMoving(const SceneBody& body, const Vec3& gravity, bool jointed) {
   const auto refuse = [&](const std::string& why) {
     throw std::invalid_argument("body " + body.name + ": " + why);
   };
   const PrincipalInertia inertia = Diagonalize(body.inertia);
   if (!(body.mass_kg > 0)) refuse("a moving body needs a mass");
   if (!(inertia.moments.minCoeff() > 0)) refuse("a moving body needs a positive inertia");
-  if (body.colliders.empty()) refuse("a moving body needs a shape");
+  if (body.colliders.empty() && !jointed) refuse("a moving body needs a shape, or a joint");
 
   MovingBody made;
   auto compound = std::make_unique<btCompoundShape>();
@@ -93,15 +95,16 @@ void BulletBodies::AddMoving(const SceneBody& body, const Vec3& gravity) {
     shapes_.push_back(MakeBulletShape(collider.shape));
     compound->addChildShape(ToBullet(pose_PB * collider.pose_BS), shapes_.back().get());
   }
-  btCollisionShape* shape = shapes_.back().get();
-  const btTransform& placed = compound->getChildTransform(0);
-  if (body.colliders.size() > 1 || !(placed == btTransform::getIdentity())) {
+  btCollisionShape* shape = body.colliders.empty() ? nullptr : shapes_.back().get();
+  if (body.colliders.size() != 1 ||
+      !(compound->getChildTransform(0) == btTransform::getIdentity())) {
     shape = compound.get();
     shapes_.push_back(std::move(compound));
   }
 
   const Pose pose_WP = body.pose_WB * Pose{.orientation = inertia.orientation};
-  btRigidBody* rigid = Add(body.mass_kg, inertia.moments, shape, body.colliders.front(), pose_WP);
+  const Collider surface = body.colliders.empty() ? Collider{} : body.colliders.front();
+  btRigidBody* rigid = Add(body.mass_kg, inertia.moments, shape, surface, pose_WP);
   rigid->setCcdMotionThreshold(made.inner_radius / 2);
   rigid->setCcdSweptSphereRadius(made.inner_radius / 2);
   // Ours: the hook turns the body, gyroscopic torque included, and gravity is the scene's.
@@ -109,6 +112,7 @@ void BulletBodies::AddMoving(const SceneBody& body, const Vec3& gravity) {
   rigid->setGravity(ToBullet(body.falls ? gravity : Vec3(Vec3::Zero())));
   rigid->setUserIndex(static_cast<int>(moving.size()));
   made.rigid = rigid;
+  made.jointed = jointed;
   made.inertia = BodyInertia::Of(body.mass_kg, Mat3(inertia.moments.asDiagonal()));
   made.q_BP = inertia.orientation;
   made.air = AirDrag::On(body);

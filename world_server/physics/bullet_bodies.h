@@ -26,6 +26,7 @@ struct MovingBody {
   double inner_radius = 0;  // m, of the largest ball in it
   double outer_radius = 0;  // m, of the ball about its centre of mass that holds it
   double gravity = 0;       // m/s^2, that acts on it
+  bool jointed = false;     // bullet_joints.h moves it
 
   // At the start of the substep, the kick included.
   Vec3 velocity = Vec3::Zero();
@@ -58,7 +59,7 @@ class BulletBodies {
 
  private:
   void AddFixed(const SceneBody& body);
-  void AddMoving(const SceneBody& body, const Vec3& gravity);
+  void AddMoving(const SceneBody& body, const Vec3& gravity, bool jointed);
   btRigidBody* Add(double mass, const Vec3& moments, btCollisionShape* shape,
                    const Collider& surface, const Pose& pose);
 

@@ -9,8 +9,6 @@
 namespace rikiseki::world {
 namespace {
 
-constexpr double kStale = 1e-5;  // m of sliding in one substep
-
 const btRigidBody* Body(const btCollisionObject* object) {
   return btRigidBody::upcast(object);
 }
@@ -26,15 +24,6 @@ Vec3 Slip(const btPersistentManifold& manifold, const btManifoldPoint& point) {
   return FromBullet(relative - relative.dot(normal) * normal);
 }
 
-bool KeepsPoints(const btPersistentManifold& manifold) {
-  const int shape_0 = manifold.getBody0()->getCollisionShape()->getShapeType();
-  const int shape_1 = manifold.getBody1()->getCollisionShape()->getShapeType();
-  const auto fresh = [](int shape) {
-    return shape == STATIC_PLANE_PROXYTYPE || shape == SPHERE_SHAPE_PROXYTYPE;
-  };
-  return !fresh(shape_0) && !fresh(shape_1);
-}
-
 // The way that a body slid before it came to stick within the substep: as friction can brake it, at most
 // as long as the substep. Not where a kick came, which friction may have undone.
 Vec3 LastWay(const MovingBody& body, double step_s) {
@@ -47,17 +36,6 @@ Vec3 LastWay(const MovingBody& body, double step_s) {
 }
 
 }  // namespace
-
-void DropStaleContacts(std::span<btPersistentManifold* const> manifolds, double step_s) {
-  for (btPersistentManifold* manifold : manifolds) {
-    if (!KeepsPoints(*manifold)) continue;
-    for (int j = 0; j < manifold->getNumContacts(); ++j) {
-      if (Slip(*manifold, manifold->getContactPoint(j)).norm() * step_s > kStale) {
-        manifold->clearManifold();
-      }
-    }
-  }
-}
 
 void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> stepped) {
   for (const std::size_t place : stepped) {
@@ -88,6 +66,7 @@ void EndSubstep(std::span<btPersistentManifold* const> manifolds, std::vector<Mo
   }
   for (const std::size_t place : stepped) {
     MovingBody& body = moving[place];
+    if (body.jointed) continue;
     const Vec3 change = FromBullet(body.rigid->getLinearVelocity()) - body.velocity;
     btTransform pose = body.rigid->getWorldTransform();
     pose.setOrigin(pose.getOrigin() - ToBullet(step_s / 2 * body.pushing.HalfAct(change)) +

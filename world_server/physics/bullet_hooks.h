@@ -1,6 +1,6 @@
-// What Bullet's substep lacks, added from outside: the second-order position rule, rotation that
-// keeps the angular momentum, and no stale contacts under sliding pairs. The rules themselves are
-// those of the haptic side's local copies (common/rigid_body.h), so that copy and world agree.
+// What Bullet's substep lacks, added from outside: the second-order position rule and
+// rotation that keeps the angular momentum. The rules themselves are those of the haptic side's local
+// copies (common/rigid_body.h), so that copy and world agree.
 //
 // Measured at 10 ms substeps: free fall 49 mm -> 0, stop distance of a sliding box 9-14 mm -> 0.14
 // mm, energy of a tumbling plate -71 % -> 2e-7.
@@ -15,11 +15,6 @@
 class btPersistentManifold;
 
 namespace rikiseki::world {
-
-/// Forgets contacts of pairs that slide by more than 10 um in a substep, where Bullet keeps points
-/// from substep to substep: they lag behind. Before the contacts are found anew. Half-space pairs find
-/// all their points anew anyway, spheres have only one.
-void DropStaleContacts(std::span<btPersistentManifold* const> manifolds, double step_s);
 
 /// Remembers velocities and attitudes of the stepped bodies, places in `moving`. After the kicks, before
 /// the solver.

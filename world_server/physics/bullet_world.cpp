@@ -78,7 +78,7 @@ struct BulletWorld::Engine {
         bodies(scene),
         resting_depth(1e-4 * bodies.smallest),
         sleepers(bodies.moving, parts.sleeping),
-        world(dispatcher, broadphase, *solver, configuration, bodies, pairs, sleepers, parts,
+        world(scene, dispatcher, broadphase, *solver, configuration, bodies, pairs, sleepers, parts,
               resting_depth),
         pushed(bodies.moving.size()),
         pushed_speed(bodies.moving.size()) {
@@ -115,12 +115,16 @@ void BulletWorld::Engine::Apply(const Kick& kick) {
   Mark(body, kick.impulse, kick.angular_impulse);
   ApplyKick(bodies.moving[body], kick.impulse, kick.angular_impulse);
   moved.push_back(body);
+  const std::span<const std::size_t> settled = world.joints().Settle(body);
+  moved.insert(moved.end(), settled.begin(), settled.end());
 }
 
 void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
-  const MovingBody& body = bodies.moving[bodies.moving_of[push.body]];
+  const std::size_t place = bodies.moving_of[push.body];
+  const MovingBody& body = bodies.moving[place];
   const Kick kick = KickOf(push, body.State().pose.position);
   ApplyKick(body, kick.impulse, kick.angular_impulse);
+  world.joints().Settle(place);
 }
 
 // Of a group alone.
@@ -255,6 +259,7 @@ void BulletWorld::SetState(std::size_t body, const BodyState& state) {
   const std::size_t place = engine_->bodies.moving_of[body];
   engine_->sleepers.Wake(place);
   engine_->bodies.moving[place].SetState(state);
+  engine_->islands.UpdateBox(place);
   states_[body] = state;
 }
 
@@ -274,7 +279,7 @@ void BulletWorld::Play(std::span<const Stretch> stretches) {
 
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
-  if (!engine_ || scene_.bodies[body].fixed) return false;
+  if (!engine_ || scene_.bodies[body].fixed || IsJointed(scene_, body)) return false;
   const std::size_t place = engine_->bodies.moving_of[body];
   const std::vector<std::size_t> others = engine_->islands.Near(place, reach_m);
   const std::size_t first = sites.size();

@@ -121,7 +121,7 @@ bool SiteFinder::Find(std::span<const BodyState> states, std::size_t body, doubl
     const Pose pose_WS = state.pose * collider.pose_BS;
     const auto* ellipsoid = std::get_if<Ellipsoid>(&collider.shape);
     for (const std::size_t other : others) {
-      if (other == body) continue;
+      if (other == body || !Collide(scene_, body, other)) continue;
       const SceneBody& other_body = scene_.bodies[other];
       for (std::size_t i = 0; i < bodies_[other].solids.size(); ++i) {
         const Collider& other_collider = other_body.colliders[i];

@@ -1,5 +1,5 @@
-// Rigid-body dynamics as the world loop sees it. Behind it stand Bullet (bullet_world.h) and the
-// one-dimensional sliding block of the paper's Fig. 6 (sliding_block.h).
+// Dynamics as the world loop sees it. Behind it stand Bullet (bullet_world.h), soft bodies beside it
+// (deformable_world.h), and the one-dimensional sliding block of the paper's Fig. 6 (sliding_block.h).
 #pragma once
 
 #include <cstddef>
@@ -10,6 +10,8 @@
 #include "common/rigid_body.h"
 
 namespace rikiseki::world {
+
+class SoftSurface;
 
 /// An impulse on one body, as a velocity kick.
 struct Kick {
@@ -76,6 +78,9 @@ class DynamicsWorld {
   /// first. False, and nothing, where that cannot be told: the body then has no local copy.
   virtual bool FindContacts(std::size_t body, double reach_m,
                             std::vector<ContactSite>& sites) const = 0;
+
+  /// The surface of a body that deforms; null of any other.
+  virtual const SoftSurface* FindSoft(std::size_t /*body*/) const { return nullptr; }
 };
 
 }  // namespace rikiseki::world

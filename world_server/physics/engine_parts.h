@@ -8,7 +8,7 @@ namespace rikiseki::world {
 
 struct EngineParts {
   bool contacts = true;     // broad phase, contact points, contact solver; without: integrator only
-  bool friction = true;     // friction rows, and forgetting stale contacts of what slides
+  bool friction = true;     // friction rows
   bool rotation = true;     // axes that precess; without, angular velocities are kept
   bool drag = true;         // of the air
   bool rebound = true;      // restitution

@@ -6,18 +6,14 @@
 #include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/bullet_rebound.h"
+#include "world_server/physics/jointed_solver.h"
 
 namespace rikiseki::world {
 namespace {
 
-// What glides keeps its contacts, whether friction is part of the engine or not.
-bool RubsOn(const ContactPair& pair) {
-  return pair.first->getFriction() * pair.second->getFriction() > 0;
-}
-
 // Without friction there are no rows of it to sweep over. Only the pool's length is taken back: Bullet
 // still reads the rows, impulse 0 as they were made, when it writes the contacts back.
-class FrictionlessSolver final : public btSequentialImpulseConstraintSolver {
+class FrictionlessSolver final : public JointedSolver {
  protected:
   void convertContacts(btPersistentManifold** manifolds, int count,
                        const btContactSolverInfo& info) override {
@@ -30,10 +26,11 @@ class FrictionlessSolver final : public btSequentialImpulseConstraintSolver {
 
 std::unique_ptr<btSequentialImpulseConstraintSolver> MakeSolver(const EngineParts& parts) {
   if (!parts.friction) return std::make_unique<FrictionlessSolver>();
-  return std::make_unique<btSequentialImpulseConstraintSolver>();
+  return std::make_unique<JointedSolver>();
 }
 
-GroupedWorld::GroupedWorld(btCollisionDispatcher& dispatcher, btDbvtBroadphase& broadphase,
+GroupedWorld::GroupedWorld(const Scene& scene, btCollisionDispatcher& dispatcher,
+                           btDbvtBroadphase& broadphase,
                            btSequentialImpulseConstraintSolver& solver,
                            btCollisionConfiguration& configuration, BulletBodies& bodies,
                            ContactPairs& pairs, Sleepers& sleepers, const EngineParts& parts,
@@ -61,9 +58,11 @@ GroupedWorld::GroupedWorld(btCollisionDispatcher& dispatcher, btDbvtBroadphase& 
     if (!parts.fast_bodies) body.rigid->setCcdMotionThreshold(0);
   }
   for (const auto& rigid : bodies.rigid_bodies) addRigidBody(rigid.get());
+  jointed_ = std::make_unique<BulletJoints>(scene, bodies, *this);
 }
 
 GroupedWorld::~GroupedWorld() {
+  jointed_.reset();
   releasePredictiveContacts();
   for (const auto& rigid : bodies_.rigid_bodies) removeRigidBody(rigid.get());
 }
@@ -142,7 +141,6 @@ void GroupedWorld::FindContacts(const Group& group, double step_s) {
       const int second = pair->second_moving();
       if (pair->asked == substep_ || !(awake(first) || awake(second))) continue;
       pair->asked = substep_;
-      if (RubsOn(*pair)) DropStaleContacts(pair->manifolds, step_s);
       pairs_.Ask(*pair);
       const int sleeper = sleeps(first) ? first : sleeps(second) ? second : -1;
       if (sleeper < 0 || !WillTouch(*pair, step_s)) continue;
@@ -210,10 +208,15 @@ void GroupedWorld::Step(const Group& group, double step_s, int sweeps) {
   FindContacts(group, step_s);
   BeginSubstep(bodies_.moving, stepped_);
   if (parts_.drag) BlowAir(step_s);
+  jointed_->BeginSubstep(stepped_, step_s);
   Solve(group, step_s);
   integrateTransformsInternal(rigids_.data(), static_cast<int>(rigids_.size()), step_s);
   EndSubstep(manifolds_, bodies_.moving, stepped_, step_s, parts_.rotation);
-  if (parts_.rebound) Rebound(manifolds_, bodies_, gravity_, step_s);
+  jointed_->EndSubstep(manifolds_, step_s);
+  if (parts_.rebound) {
+    Rebound(manifolds_, bodies_, gravity_, step_s);
+    for (const std::size_t place : stepped_) jointed_->Settle(place);
+  }
   for (const std::size_t place : stepped_) {
     MovingBody& body = bodies_.moving[place];
     body.last_step_s = step_s;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "world_server/physics/bullet_bodies.h"
+#include "world_server/physics/bullet_joints.h"
 #include "world_server/physics/contact_pairs.h"
 #include "world_server/physics/engine_parts.h"
 #include "world_server/physics/islands.h"
@@ -22,7 +23,7 @@ std::unique_ptr<btSequentialImpulseConstraintSolver> MakeSolver(const EnginePart
 class GroupedWorld final : public btDiscreteDynamicsWorld {
  public:
   /// All outlive this. `resting_depth` [m]: so deep bodies rest in each other.
-  GroupedWorld(btCollisionDispatcher& dispatcher, btDbvtBroadphase& broadphase,
+  GroupedWorld(const Scene& scene, btCollisionDispatcher& dispatcher, btDbvtBroadphase& broadphase,
                btSequentialImpulseConstraintSolver& solver, btCollisionConfiguration& configuration,
                BulletBodies& bodies, ContactPairs& pairs, Sleepers& sleepers,
                const EngineParts& parts, double resting_depth);
@@ -30,6 +31,8 @@ class GroupedWorld final : public btDiscreteDynamicsWorld {
 
   /// Advances the group's awake bodies; the solver goes `sweeps` times over its contacts. Who sleeps and is about to be touched wakes first.
   void Step(const Group& group, double step_s, int sweeps);
+
+  BulletJoints& joints() { return *jointed_; }
 
  private:
   void FindStepped(const Group& group);
@@ -49,6 +52,7 @@ class GroupedWorld final : public btDiscreteDynamicsWorld {
   std::vector<btRigidBody*> rigids_;              // the same
   std::vector<btPersistentManifold*> manifolds_;  // of the stepped
   std::vector<btTypedConstraint*> joints_;        // likewise
+  std::unique_ptr<BulletJoints> jointed_;
 };
 
 }  // namespace rikiseki::world

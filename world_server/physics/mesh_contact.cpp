@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <tuple>
 
 #include "world_server/physics/convex_contact.h"
 #include "world_server/scene/shape_size.h"
@@ -20,54 +19,40 @@ constexpr double kFlatCorner =
 
 constexpr std::size_t kMostMeshPoints = 24;  // more than a local copy takes
 
-// Leaves the corners of the points' outline across their normal, in its order.
+// Leaves the corners of the points' outline across their normal, going round. Wrapped from corner to
+// corner; what stands out by less than the tolerance is none.
 void KeepOutline(std::vector<ContactPoint>& points, double size) {
-  if (points.size() < 3) return;
-  const Vec3 normal = points[0].normal_W;
-  const Vec3 u =
-      (std::abs(normal.x()) < 0.7 ? Vec3::UnitX() : Vec3::UnitY()).cross(normal).normalized();
-  const Vec3 v = normal.cross(u);
-  struct Flat {
-    double x, y;
-    std::size_t index;
-  };
-  std::vector<Flat> flat;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    flat.push_back({u.dot(points[i].point_W), v.dot(points[i].point_W), i});
-  }
-  std::ranges::sort(flat, [](const Flat& a, const Flat& b) {
-    return std::tuple(a.x, a.y, a.index) < std::tuple(b.x, b.y, b.index);
-  });
-  // Andrew's monotone chain; what stands out by less than the tolerance is no corner.
+  if (points.size() < 2) return;
   const double least = kFlatCorner * size;
-  std::vector<Flat> outline;
-  const auto turns = [&](const Flat& a, const Flat& b, const Flat& c) {
-    const double length = std::hypot(c.x - a.x, c.y - a.y);
-    const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-    return length > least ? area > least * length : std::hypot(b.x - a.x, b.y - a.y) > least;
-  };
-  for (int side = 0; side < 2; ++side) {
-    const std::size_t start = outline.size();
-    for (const Flat& next : flat) {
-      while (outline.size() >= start + 2 &&
-             !turns(outline[outline.size() - 2], outline.back(), next)) {
-        outline.pop_back();
-      }
-      if (outline.size() > start &&
-          std::hypot(next.x - outline.back().x, next.y - outline.back().y) <= least) {
-        continue;
-      }
-      outline.push_back(next);
-    }
-    if (outline.size() > start + 1) outline.pop_back();
-    std::ranges::reverse(flat);
-  }
-  if (outline.size() == 2 &&
-      std::hypot(outline[0].x - outline[1].x, outline[0].y - outline[1].y) <= least) {
-    outline.pop_back();
+  const Vec3 normal = points[0].normal_W;
+  const auto across = [&](const Vec3& v) { return Vec3(v - v.dot(normal) * normal); };
+  // From the same corner whatever the triangles' order: the solver goes on from the last impulses.
+  const Vec3 u = normal.unitOrthogonal();
+  const Vec3 v = normal.cross(u);
+  std::size_t start = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const Vec3 lead = points[i].point_W - points[start].point_W;
+    const double ahead = u.dot(lead);
+    if (ahead > least || (ahead >= -least && v.dot(lead) > 0)) start = i;
   }
   std::vector<ContactPoint> kept;
-  for (const Flat& corner : outline) kept.push_back(points[corner.index]);
+  std::size_t here = start;
+  do {
+    kept.push_back(points[here]);
+    std::size_t next = here;
+    Vec3 way = Vec3::Zero();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Vec3 other = across(points[i].point_W - points[here].point_W);
+      if (other.norm() <= least) continue;
+      const double right = next == here ? 1 : other.cross(way.normalized()).dot(normal);
+      if (right > least || (right >= -least && other.norm() > way.norm())) {
+        next = i;
+        way = other;
+      }
+    }
+    here = next;
+  } while (kept.size() < points.size() &&
+           across(points[here].point_W - points[start].point_W).norm() > least);
   points = std::move(kept);
 }
 

@@ -87,9 +87,7 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
                                    bodies.restitutions[static_cast<std::size_t>(second)] >
                                0;
   }
-  for (const btTypedConstraint* joint : group.joints) {
-    join(joint->getRigidBodyA(), joint->getRigidBodyB());
-  }
+  motion.meets = motion.meets || !group.joints.empty();  // solved exactly, whatever their masses
   if (motion.meets_moving) {
     motion.mass_ratio = heaviest / lightest;
     motion.smallest = std::isfinite(least) ? least : bodies.smallest;

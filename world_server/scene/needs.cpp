@@ -28,6 +28,7 @@ bool SomePairHas(const Scene& scene, bool (*is)(const Collider&)) {
   std::size_t bodies = 0;
   bool one_moves = false;
   for (const SceneBody& body : scene.bodies) {
+    if (body.softness) continue;  // touches nothing but what holds it
     if (std::none_of(body.colliders.begin(), body.colliders.end(), is)) continue;
     ++bodies;
     one_moves = one_moves || !body.fixed;
@@ -37,15 +38,20 @@ bool SomePairHas(const Scene& scene, bool (*is)(const Collider&)) {
 
 SceneNeeds WorkOutNeeds(const Scene& scene, const SceneUse& use) {
   std::size_t moving = 0;
+  bool deforms = false;
   bool drag = false;
   bool precesses = false;
   bool rubs_finger = false;
-  for (const SceneBody& body : scene.bodies) {
+  bool copies = false;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const SceneBody& body = scene.bodies[i];
     for (const Collider& collider : body.colliders) {
       rubs_finger = rubs_finger || use.finger_friction * collider.friction > 0;
     }
-    if (body.fixed) continue;
+    deforms = deforms || body.softness;
+    if (body.fixed || body.softness) continue;
     ++moving;
+    copies = copies || !IsJointed(scene, i);  // what is jointed has no copy
     drag = drag || AirDrag::On(body).acts();
     precesses = precesses || !BodyInertia::Of(body.mass_kg, body.inertia).isotropic;
   }
@@ -61,8 +67,8 @@ SceneNeeds WorkOutNeeds(const Scene& scene, const SceneUse& use) {
   sort(precesses, protocol::kNeedRotation);
   sort(drag, protocol::kNeedDrag);
   sort(meets, protocol::kNeedFastBodies);
-  sort(false, protocol::kNeedDeformation);
-  sort(moving > 0 && use.coupling == protocol::Coupling::kLocal, protocol::kNeedLocalBodies);
+  sort(deforms, protocol::kNeedDeformation);
+  sort(copies && use.coupling == protocol::Coupling::kLocal, protocol::kNeedLocalBodies);
   return found;
 }
 

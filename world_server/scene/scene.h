@@ -3,7 +3,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -76,6 +78,16 @@ struct Collider {
   bool operator==(const Collider&) const = default;
 };
 
+/// What a body that deforms is made of; its mass is spread evenly over its one collider.
+struct Softness {
+  double youngs_modulus_pa = 0;
+  double poisson_ratio = 0.3;
+  double relaxation_s = 0.02;  // damping: stress = C (strain + relaxation strain rate)
+  double element_m = 0;        // edge of the tetrahedra, roughly
+
+  bool operator==(const Softness&) const = default;
+};
+
 struct SceneBody {
   std::string name;  // "model::link"
   bool fixed = false;
@@ -87,16 +99,52 @@ struct SceneBody {
   double angular_drag_nms = 0;  // N m s/rad
   Vec3 wind = Vec3::Zero();     // m/s, of the air round this body
   std::vector<Collider> colliders = {};
+  // Links of one model pass through each other unless one of them says otherwise; 0 = of none.
+  std::uint32_t model = 0;
+  bool self_collides = false;
+  std::optional<Softness> softness = {};  // none: rigid
 
   bool operator==(const SceneBody&) const = default;
+};
+
+/// What leaves two bodies one freedom, or the three of a ball. Jointed bodies do not collide. All
+/// positions are 0 at the start: there both frames are the same one in W.
+struct Joint {
+  enum class Type {
+    kRevolute,   // turns about z; position in rad, damping in N m s, friction in N m
+    kPrismatic,  // slides along z; position in m, damping in N s/m, friction in N
+    kBall,       // neither limits nor friction
+  };
+  static constexpr std::size_t kWorld = static_cast<std::size_t>(-1);
+
+  std::string name;  // "model::joint"
+  Type type = Type::kRevolute;
+  std::size_t parent = kWorld;  // a body, which may be fixed
+  std::size_t child = kWorld;   // likewise; at least one of the two moves
+  Pose pose_PJ = {};            // the joint in the parent's frame; in W, if that is the world
+  Pose pose_CJ = {};            // ... in the child's
+  double lower = -std::numeric_limits<double>::infinity();  // <= 0
+  double upper = std::numeric_limits<double>::infinity();   // >= 0
+  double damping = 0;
+  double friction = 0;  // Coulomb: the force or torque against which it moves
+
+  bool operator==(const Joint&) const = default;
 };
 
 struct Scene {
   std::string name;
   Vec3 gravity = Vec3(0, 0, -9.81);
   std::vector<SceneBody> bodies;  // what they are called on the wire: body_numbers.h
+  std::vector<Joint> joints = {};
 
   bool operator==(const Scene&) const = default;
 };
+
+/// Whether two bodies of a scene touch where they meet: not if they are jointed, nor as links of one
+/// model that does not collide with itself.
+bool Collide(const Scene& scene, std::size_t a, std::size_t b);
+
+/// Whether a joint holds the body.
+bool IsJointed(const Scene& scene, std::size_t body);
 
 }  // namespace rikiseki::world

@@ -18,8 +18,9 @@ struct BodyChange {
 
 /// What `now` says differently is changed, everything else goes on: what is described as before is
 /// the same; what moves goes on unless the file puts it somewhere else, even with another mass,
-/// shape or surface. One entry for each body of `now`. Of several bodies of one name the first goes
-/// with the first.
+/// shape or surface. What joints link goes on only as a whole, and if its joints are described as
+/// before. One entry for each body of `now`. Of several bodies of one name the first goes with the
+/// first.
 std::vector<BodyChange> Changed(const Scene& before, const Scene& now);
 
 /// As if the world were started anew: everything that moves begins at its start; what is fixed, and

@@ -7,9 +7,16 @@
 //   in <link>:
 //     <rikiseki:drag>          of the air, N s/m, 0 to 1e6: force = drag * (wind - velocity)
 //     <rikiseki:angular_drag>  N m s, 0 to 1e6: torque = -angular_drag * angular velocity
+//     <rikiseki:youngs_modulus>  Pa, 100 to 1e12: makes the link soft; one box, sphere or ellipsoid,
+//                                held by the static models that it touches
+//     <rikiseki:poisson_ratio>   of a soft link, 0 to 0.45; absent: 0.3
+//     <rikiseki:relaxation_s>    its damping: stress follows strain + relaxation * strain rate; 0 to 10,
+//                                absent: 0.02
+//     <rikiseki:element_size>    m, edge of its elements; absent: about 250 nodes
 #pragma once
 
 #include <sdf/Element.hh>
+#include <string>
 
 #include "world_server/scene/scene.h"
 
@@ -27,5 +34,14 @@ void ReadSurfaceExtensions(const sdf::ElementPtr& collision, Collider& collider)
 
 /// Fills in what a <link> says. Throws ConfigError likewise.
 void ReadLinkExtensions(const sdf::ElementPtr& link, SceneBody& body);
+
+/// Whether a <link> is soft, and of what. Throws ConfigError likewise. The body's colliders are known.
+void ReadSoftness(const sdf::ElementPtr& link, SceneBody& body);
+
+/// Throws ConfigError where nothing holds a soft body, or it would collapse. All bodies are known.
+void RequireHeld(const sdf::ElementPtr& link, const Scene& scene, const SceneBody& body);
+
+/// "file:line" of what makes a link soft.
+std::string PlaceOfSoftness(const sdf::ElementPtr& link);
 
 }  // namespace rikiseki::world

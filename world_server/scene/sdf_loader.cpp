@@ -16,6 +16,7 @@
 #include "protocol/messages.h"
 #include "world_server/scene/sdf_element.h"
 #include "world_server/scene/sdf_extensions.h"
+#include "world_server/scene/sdf_joint.h"
 #include "world_server/scene/sdf_mesh.h"
 #include "world_server/scene/sdf_surface.h"
 #include "world_server/scene/sdf_survey.h"
@@ -126,16 +127,17 @@ Pose Resolve(const sdf::SemanticPose& semantic, const sdf::ElementPtr& element) 
 }
 
 // The engine knows one friction and one restitution for a body that moves.
-void RequireSameSurface(const sdf::Collision& collision, const SceneBody& body,
-                        const Collider& collider) {
-  const auto require = [&](double given, double first, const std::string& what) {
-    if (given == first) return;
+void RequireSameSurface(const sdf::Collision& collision, const std::string& link,
+                        const Collider& first, const Collider& collider) {
+  const auto require = [&](double given, double before, const std::string& what) {
+    if (given == before) return;
     Refuse(collision.Element(),
-           "collision " + collision.Name() + " of link " + body.name + " has another " + what +
-               " than the first; give all collisions of a moving link the same");
+           "collision " + collision.Name() + " of link " + link + " has another " + what +
+               " than the first; give all collisions of a moving link, and of links that are fixed "
+               "to it, the same");
   };
-  require(collider.friction, body.colliders[0].friction, "friction");
-  require(collider.restitution, body.colliders[0].restitution, "restitution");
+  require(collider.friction, first.friction, "friction");
+  require(collider.restitution, first.restitution, "restitution");
 }
 
 Shape ReadPrimitive(const sdf::Collision& collision) {
@@ -173,8 +175,8 @@ Shape ReadPrimitive(const sdf::Collision& collision) {
     }
     default:
       Refuse(at,
-             "a collision may be a box, sphere, plane, cylinder, capsule, ellipsoid or mesh; "
-             "heightmaps, polylines and the like are not built");
+             "a collision may be a box, sphere, plane, cylinder, capsule, ellipsoid or mesh; give "
+             "a heightmap or polyline as a mesh (OBJ, STL or DAE)");
   }
 }
 
@@ -210,10 +212,11 @@ void ReadForces(const sdf::Link& link, const sdf::Model& model, const Vec3& wind
   for (const char* name : {"linear", "angular"}) {
     const auto decay = FindExplicit(link.Element(), {"velocity_decay", name});
     if (decay && decay->Get<double>() != 0) {
-      Refuse(decay, std::string("<velocity_decay> means another thing in each engine and is not "
-                                "built; <rikiseki:") +
-                        (name[0] == 'l' ? "drag" : "angular_drag") +
-                        "> of the link says it in units");
+      warnings.push_back(PlaceOf(decay) +
+                         ": <velocity_decay> means another thing in each engine and is not used; "
+                         "<rikiseki:" +
+                         (name[0] == 'l' ? "drag" : "angular_drag") +
+                         "> of the link says it in units");
     }
   }
   if (!model.EnableWind() && !link.EnableWind()) return;
@@ -228,27 +231,23 @@ class Loader {
   Loader(LoadedScene& loaded, const std::string& folder, const Vec3& wind)
       : loaded_(loaded), meshes_(folder, loaded.warnings), wind_(wind) {}
 
-  void ReadModel(const sdf::Model& model, const std::string& prefix, const Pose& pose_WP,
-                 bool in_static) {
-    const std::string name = prefix + model.Name();
-    const bool is_static = in_static || model.Static();
-    const Pose pose_WM = pose_WP * Resolve(model.SemanticPose(), model.Element());
-    for (std::uint64_t i = 0; i < model.LinkCount(); ++i) {
-      ReadLink(*model.LinkByIndex(i), model, name, pose_WM, is_static);
+  void ReadWorld(const sdf::World& world) {
+    for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
+      FindLinks(*world.ModelByIndex(i), "", Pose{}, /*in_static=*/false);
     }
-    if (!is_static && model.LinkCount() > 1 && !model.SelfCollide()) {
-      const auto self_collide = FindExplicit(model.Element(), {"self_collide"});
-      if (self_collide) {
-        Refuse(self_collide, "<self_collide> false of model " + name +
-                                 ": links that pass through each other are not built");
+    const std::vector<std::size_t> first = FollowFixedJoints(joints_, links_);
+    body_of_.assign(links_.size(), Joint::kWorld);
+    for (std::size_t i = 0; i < links_.size(); ++i) {
+      SceneBody body = ReadLink(i);
+      if (first[i] != i && body_of_[first[i]] != Joint::kWorld) {
+        Merge(i, body, body_of_[first[i]]);
+      } else if (!links_[i].fixed || !body.colliders.empty()) {  // else it is only for eyes
+        Add(i, std::move(body));
       }
-      loaded_.warnings.push_back(PlaceOf(model.Element()) + ": the links of model " + name +
-                                 " collide with each other here, which SDF says with "
-                                 "<self_collide>true</self_collide>");
     }
-    for (std::uint64_t i = 0; i < model.ModelCount(); ++i) {
-      ReadModel(*model.ModelByIndex(i), name + "::", pose_WM, is_static);
-    }
+    for (const SdfJoint& joint : joints_) AddJoint(joint);
+    RequireShapes();
+    CheckSoftLinks();
   }
 
  private:
@@ -257,47 +256,160 @@ class Loader {
     return mesh != nullptr ? meshes_.Read(*mesh, is_static) : ReadPrimitive(collision);
   }
 
-  void ReadLink(const sdf::Link& link, const sdf::Model& model, const std::string& model_name,
-                const Pose& pose_WM, bool is_static) {
+  void FindLinks(const sdf::Model& model, const std::string& prefix, const Pose& pose_WP,
+                 bool in_static) {
+    const std::string name = prefix + model.Name();
+    const bool is_static = in_static || model.Static();
+    const Pose pose_WM = pose_WP * Resolve(model.SemanticPose(), model.Element());
+    ++models_;
+    for (std::uint64_t i = 0; i < model.LinkCount(); ++i) {
+      const sdf::Link& link = *model.LinkByIndex(i);
+      links_.push_back({.name = name + "::" + link.Name(),
+                        .fixed = is_static,
+                        .pose_WL = pose_WM * Resolve(link.SemanticPose(), link.Element())});
+      sources_.push_back({.link = &link, .model = &model, .number = models_});
+    }
+    if (!is_static) ReadModelJoints(model, name, pose_WM, joints_, loaded_.warnings);
+    for (std::uint64_t i = 0; i < model.ModelCount(); ++i) {
+      FindLinks(*model.ModelByIndex(i), name + "::", pose_WM, is_static);
+    }
+  }
+
+  SceneBody ReadLink(std::size_t place) {
+    const auto& [link, model, number] = sources_[place];
     SceneBody body;
-    body.name = model_name + "::" + link.Name();
-    body.fixed = is_static;
-    if (link.CollisionCount() == 0) {
-      if (is_static) return;  // only for eyes
-      Refuse(link.Element(), "link " + body.name +
-                                 " can move and has no collision; give it one, or make its model "
-                                 "static");
-    }
-    const Pose pose_WL = pose_WM * Resolve(link.SemanticPose(), link.Element());
+    body.name = links_[place].name;
+    body.fixed = links_[place].fixed;
     Pose pose_LB;  // the link's axes, at its centre of mass
-    if (!is_static) {
-      ReadInertia(link, body, loaded_.warnings);
-      pose_LB.position = FromSdf(link.Inertial().Pose().Pos());
-      ReadForces(link, model, wind_, body, loaded_.warnings);
+    if (!body.fixed) {
+      ReadInertia(*link, body, loaded_.warnings);
+      pose_LB.position = FromSdf(link->Inertial().Pose().Pos());
+      ReadForces(*link, *model, wind_, body, loaded_.warnings);
+      if (model->LinkCount() > 1) body.model = number;
+      const auto self_collide = FindExplicit(link->Element(), {"self_collide"});
+      body.self_collides = model->SelfCollide() || (self_collide && self_collide->Get<bool>());
     }
-    body.pose_WB = pose_WL * pose_LB;
-    for (std::uint64_t i = 0; i < link.CollisionCount(); ++i) {
-      const sdf::Collision& collision = *link.CollisionByIndex(i);
+    body.pose_WB = links_[place].pose_WL * pose_LB;
+    for (std::uint64_t i = 0; i < link->CollisionCount(); ++i) {
+      const sdf::Collision& collision = *link->CollisionByIndex(i);
       Collider collider;
-      collider.shape = ReadShape(collision, is_static);
-      if (!is_static && std::holds_alternative<HalfSpace>(collider.shape)) {
+      collider.shape = ReadShape(collision, body.fixed);
+      if (!body.fixed && std::holds_alternative<HalfSpace>(collider.shape)) {
         Refuse(collision.Element(),
                "link " + body.name + " can move and has a plane; planes belong to static models");
       }
       collider.pose_BS = pose_LB.Inverse() * Resolve(collision.SemanticPose(), collision.Element());
       ReadSurface(collision.Element(), collider, loaded_.warnings);
-      if (!is_static && i > 0) RequireSameSurface(collision, body, collider);
+      if (!body.fixed && i > 0) {
+        RequireSameSurface(collision, body.name, body.colliders[0], collider);
+      }
       body.colliders.push_back(collider);
     }
+    ReadSoftness(link->Element(), body);
+    return body;
+  }
+
+  void Add(std::size_t place, SceneBody body) {
     if (loaded_.scene.bodies.size() == protocol::kMaxBodies) {
-      Refuse(link.Element(), "more than " + std::to_string(protocol::kMaxBodies) + " bodies");
+      Refuse(sources_[place].link->Element(),
+             "more than " + std::to_string(protocol::kMaxBodies) + " bodies");
     }
+    body_of_[place] = loaded_.scene.bodies.size();
+    element_of_.push_back(sources_[place].link->Element());
     loaded_.scene.bodies.push_back(std::move(body));
   }
+
+  // A link into the body to which it is fixed.
+  void Merge(std::size_t place, const SceneBody& link, std::size_t into) {
+    SceneBody& body = loaded_.scene.bodies[into];
+    const sdf::Link& source = *sources_[place].link;
+    for (const SceneBody* soft : {static_cast<const SceneBody*>(&body), &link}) {
+      if (soft->softness) RefuseJointed(source.Element(), soft->name);
+    }
+    if (link.falls != body.falls) {
+      Refuse(source.Element(), "link " + link.name + " is fixed to link " + body.name +
+                                   ", and <gravity> acts on one of them only; give both the same");
+    }
+    if (!link.colliders.empty() && !body.colliders.empty()) {
+      RequireSameSurface(*source.CollisionByIndex(0), link.name, body.colliders[0],
+                         link.colliders[0]);
+    }
+    body = Merged(body, link);
+    body_of_[place] = into;
+  }
+
+  void AddJoint(const SdfJoint& read) {
+    if (read.fixed) return;
+    Joint joint = read.joint;
+    const auto attach = [&](const std::string& end, std::size_t& body, Pose& frame) {
+      frame = read.pose_WJ;
+      const auto link = std::find_if(links_.begin(), links_.end(),
+                                     [&](const SdfLink& other) { return other.name == end; });
+      if (link == links_.end()) return false;
+      body = body_of_[static_cast<std::size_t>(link - links_.begin())];
+      if (body == Joint::kWorld) return false;
+      frame = loaded_.scene.bodies[body].pose_WB.Inverse() * read.pose_WJ;
+      return !loaded_.scene.bodies[body].fixed;
+    };
+    const bool parent_moves = attach(read.parent, joint.parent, joint.pose_PJ);
+    const bool child_moves = attach(read.child, joint.child, joint.pose_CJ);
+    if ((!parent_moves && !child_moves) || joint.parent == joint.child) {
+      loaded_.warnings.push_back(PlaceOf(read.element) + ": joint " + read.name +
+                                 " connects what cannot move against each other");
+      return;
+    }
+    loaded_.scene.joints.push_back(std::move(joint));
+  }
+
+  // What moves without a shape must at least hang on a joint.
+  void RequireShapes() const {
+    const Scene& scene = loaded_.scene;
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+      if (!scene.bodies[i].colliders.empty() || IsJointed(scene, i)) continue;
+      Refuse(element_of_[i], "link " + scene.bodies[i].name +
+                                 " can move and has no collision; give it one, or make its model "
+                                 "static");
+    }
+  }
+
+  void CheckSoftLinks() {
+    const Scene& scene = loaded_.scene;
+    const auto rigid = std::find_if(scene.bodies.begin(), scene.bodies.end(),
+                                    [](const auto& body) { return !body.fixed && !body.softness; });
+    for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+      const SceneBody& body = scene.bodies[i];
+      if (!body.softness) continue;
+      if (IsJointed(scene, i)) RefuseJointed(element_of_[i], body.name);
+      RequireHeld(element_of_[i], scene, body);
+      if (rigid == scene.bodies.end()) continue;
+      loaded_.warnings.push_back(PlaceOfSoftness(element_of_[i]) + ": soft link " + body.name +
+                                 " and rigid links that move, as " + rigid->name +
+                                 ", pass through each other");
+    }
+  }
+
+  [[noreturn]] static void RefuseJointed(const sdf::ElementPtr& link, const std::string& name) {
+    Refuse(link,
+           "link " + name +
+               " is soft, and a joint holds it; joints hold rigid links only: a soft one is held "
+               "by static models that it touches");
+  }
+
+  struct Source {
+    const sdf::Link* link;
+    const sdf::Model* model;
+    std::uint32_t number;  // of the model, from 1
+  };
 
   LoadedScene& loaded_;
   SdfMeshes meshes_;
   Vec3 wind_;  // m/s
+  std::uint32_t models_ = 0;
+  std::vector<SdfLink> links_;
+  std::vector<Source> sources_;  // of links_
+  std::vector<SdfJoint> joints_;
+  std::vector<std::size_t> body_of_;         // of links_; kWorld: none
+  std::vector<sdf::ElementPtr> element_of_;  // of the scene's bodies
 };
 
 // The files that an element and all in it were read from.
@@ -350,9 +462,7 @@ LoadedScene LoadSdf(const std::string& path) {
   const Vec3 wind = FromSdf(world.WindLinearVelocity());
   if (!wind.allFinite()) Refuse(world.Element(), "the wind must be finite");
   Loader loader(loaded, folder, wind);
-  for (std::uint64_t i = 0; i < world.ModelCount(); ++i) {
-    loader.ReadModel(*world.ModelByIndex(i), "", Pose{}, /*in_static=*/false);
-  }
+  loader.ReadWorld(world);
   if (loaded.scene.bodies.empty()) {
     Refuse(world.Element(),
            "world " + world.Name() + " is empty; at least one model with a collision is expected");

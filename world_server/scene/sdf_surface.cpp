@@ -13,7 +13,7 @@ constexpr double kLargestStiffness = 1e6;  // N/m
 constexpr double kLargestDamping = 1e4;    // N s/m
 
 // SDF's default is 1.
-double ReadFriction(const sdf::ElementPtr& collision) {
+double ReadFriction(const sdf::ElementPtr& collision, std::vector<std::string>& warnings) {
   struct Names {
     const char *engine, *first, *second;
   };
@@ -28,8 +28,11 @@ double ReadFriction(const sdf::ElementPtr& collision) {
       Refuse(given, given->GetName() + " = " + std::to_string(mu) + ": 0 or more is expected");
     }
     if (first && second && second->Get<double>() != mu) {
-      Refuse(second, std::string(names.second) + " differs from " + names.first +
-                         ": friction that depends on direction is not built; give both the same");
+      const double mean = (mu + second->Get<double>()) / 2;
+      warnings.push_back(PlaceOf(second) + ": <" + names.second + "> differs from <" + names.first +
+                         ">: friction that depends on direction is not built; their mean, " +
+                         std::to_string(mean) + ", acts in all directions");
+      return mean;
     }
     return mu;
   }
@@ -77,7 +80,7 @@ double ReadRestitution(const sdf::ElementPtr& collision) {
 
 void ReadSurface(const sdf::ElementPtr& collision, Collider& collider,
                  std::vector<std::string>& warnings) {
-  collider.friction = ReadFriction(collision);
+  collider.friction = ReadFriction(collision, warnings);
   collider.restitution = ReadRestitution(collision);
   ReadCompliance(collision, collider, warnings);
   ReadSurfaceExtensions(collision, collider);

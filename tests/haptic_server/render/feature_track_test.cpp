@@ -78,6 +78,36 @@ TEST_CASE("an early frame starts from what is displayed now") {
   REQUIRE(track.Surfaces(kNoCopies)[0].plane.point.x() == Approx(1.68));
 }
 
+TEST_CASE("a surface's own stiffness and damping change as gradually as its point") {
+  const auto surface = [](double stiffness, double damping) {
+    protocol::Plane plane = PlaneAt(1, kPoint0, kNormal0);
+    plane.stiffness = stiffness;
+    plane.damping = damping;
+    return Frame({plane});
+  };
+  FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
+  track.Receive(surface(1000, 1), kFarFinger, kNoCopies);
+  CHECK(track.Surfaces(kNoCopies)[0].stiffness == 1000);
+  track.Advance(50);
+  track.Receive(surface(500, 2), kFarFinger, kNoCopies);
+  CHECK(track.Surfaces(kNoCopies)[0].stiffness == 1000);
+  track.Advance(10);
+  CHECK(track.Surfaces(kNoCopies)[0].stiffness == Approx(900));
+  CHECK(track.Surfaces(kNoCopies)[0].damping == Approx(1.2));
+  track.Receive(surface(600, 2), kFarFinger, kNoCopies);  // early: on from what is shown
+  CHECK(track.Surfaces(kNoCopies)[0].stiffness == Approx(900));
+  track.Advance(80);
+  CHECK(track.Surfaces(kNoCopies)[0].stiffness == 600);
+  CHECK(track.Surfaces(kNoCopies)[0].damping == 2);
+  // 0 means the haptic side's own, which nothing leads to.
+  track.Receive(surface(0, 0), kFarFinger, kNoCopies);
+  CHECK(track.Surfaces(kNoCopies)[0].stiffness == 0);
+  FeatureTrack hold(DisplayRule::kHold, kPeriodNs);
+  hold.Receive(surface(1000, 1), kFarFinger, kNoCopies);
+  hold.Receive(surface(500, 1), kFarFinger, kNoCopies);
+  CHECK(hold.Surfaces(kNoCopies)[0].stiffness == 500);
+}
+
 TEST_CASE("hold and extrapolate follow the newest frame") {
   FeatureTrack hold(DisplayRule::kHold, kPeriodNs);
   FeatureTrack extrapolate(DisplayRule::kExtrapolate, kPeriodNs);

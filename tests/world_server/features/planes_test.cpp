@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/world_server/scenes.h"
+#include "tests/world_server/jointed_scenes.h"
 
 namespace rikiseki::world {
 namespace {
@@ -114,6 +114,23 @@ TEST_CASE("the material's velocity is sent, and friction where finger and surfac
   scene.bodies[1].colliders[0].static_friction.reset();
   PlaneFinder(scene).Find(states, generations, std::vector{finger}, reach, planes);
   CHECK(planes[0].static_friction == planes[0].dynamic_friction);
+}
+
+TEST_CASE("what is jointed yields as its joint lets it") {
+  // The face of a door, at 0.7 m from the hinge: I / r^2. At its edge, towards the hinge: nothing.
+  Scene scene = test::Door();
+  const FeatureReach reach{.radius_m = 0.1, .period_s = 0.05};
+  const auto yields = [&](const Vec3& place) {
+    const Found found = Find(scene, {{.radius_m = 0.01, .position = place}}, reach);
+    REQUIRE(found.count == 1);
+    return found.planes[0].inverse_mass;
+  };
+  CHECK(yields({0.7, -0.05, 1.6}) == Approx(0.49 / test::kDoorInertia).epsilon(1e-9));
+  CHECK(yields({0.85, 0, 1}) == Approx(0).margin(1e-12));
+  // Closed against a stop it yields to one side only.
+  scene.joints[0].upper = 0;
+  CHECK(yields({0.7, -0.05, 1.6}) == Approx(0).margin(1e-12));
+  CHECK(yields({0.7, 0.05, 1.6}) == Approx(0.49 / test::kDoorInertia).epsilon(1e-9));
 }
 
 TEST_CASE("every pointer and every collider has its own plane; the nearest 32 are sent") {

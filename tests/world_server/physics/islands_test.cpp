@@ -20,8 +20,9 @@ struct PushedPeriod {
   std::vector<PlacedImpulse> pushes;
   std::vector<Stretch> stretches;
 
-  PushedPeriod(int ticks, std::size_t body, const Vec3& impulse)
-      : pushes(static_cast<std::size_t>(ticks), {.body = body, .impulse = impulse}) {
+  PushedPeriod(int ticks, std::size_t body, const Vec3& impulse, const Vec3& place = Vec3::Zero())
+      : pushes(static_cast<std::size_t>(ticks),
+               {.body = body, .impulse = impulse, .angular_impulse = place.cross(impulse)}) {
     for (const PlacedImpulse& push : pushes) {
       stretches.push_back({.length_s = 1e-3, .pushes = {&push, 1}});
     }
@@ -58,7 +59,7 @@ TEST_CASE("a push costs substeps of a tick only where it reaches") {
   }
   world.ApplyAndStep({}, 1e-3);
   const std::uint64_t before = world.substeps();
-  world.Play(PushedPeriod(50, 7, {0, 0, 1e-4}).stretches);
+  world.Play(PushedPeriod(50, 7, {0, 0, 1e-4}, {7 * 0.2, 0, 0}).stretches);
   // 50 ticks of the one, five windows of the 99 others.
   CHECK(world.substeps() - before == 50 + 99 * 5);
   // Pushed at the start of each tick: z = sum of v dt.

@@ -97,4 +97,47 @@ TEST_CASE("a mesh that was read again is the same if its triangles are") {
   CHECK_FALSE(renamed == mesh(1));
 }
 
+TEST_CASE("what joints link goes on as a whole, or starts as a whole") {
+  Scene before = ThreeBodies();
+  before.bodies.push_back(before.bodies[2]);
+  before.bodies[3].name = "third::link";
+  before.joints = {{.name = "a", .parent = 0, .child = 1}, {.name = "b", .parent = 1, .child = 2}};
+  for (const BodyChange& change : Changed(before, before)) CHECK(change.same);
+
+  // Another model before it shifts the places and the models' numbers: nothing else.
+  Scene now = before;
+  now.bodies.insert(now.bodies.begin(), test::Floor(0.3));
+  now.bodies[0].name = "new::link";
+  for (SceneBody& body : now.bodies) ++body.model;
+  for (Joint& joint : now.joints)
+    joint = {.name = joint.name, .parent = joint.parent + 1, .child = joint.child + 1};
+  auto changed = Changed(before, now);
+  for (std::size_t i = 1; i < 5; ++i) CHECK(changed[i].same);
+
+  // One of them is put elsewhere, or a joint is another: all that is linked starts.
+  now = before;
+  now.bodies[2].pose_WB.position.x() += 0.1;
+  changed = Changed(before, now);
+  CheckOne(changed[0], 0, true, false);
+  CheckOne(changed[1], 1, false, false);
+  CheckOne(changed[2], 2, false, false);
+  CheckOne(changed[3], 3, true, true);
+  now = before;
+  now.joints[0].damping = 1;
+  changed = Changed(before, now);
+  CheckOne(changed[0], 0, true, false);
+  CheckOne(changed[2], 2, false, false);
+  CheckOne(changed[3], 3, true, true);
+  now = before;
+  now.bodies[0].pose_WB.position.z() = 0.1;
+  CheckOne(Changed(before, now)[2], 2, false, false);
+
+  // Without its joint a body goes on, as another thing.
+  now = before;
+  now.joints.pop_back();
+  changed = Changed(before, now);
+  CheckOne(changed[1], 1, false, true);
+  CheckOne(changed[2], 2, false, true);
+}
+
 }  // namespace rikiseki::world
