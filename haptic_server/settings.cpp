@@ -84,7 +84,8 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Number("mapping.force_scale", &mapping.force_scale, 1e-3, 1e3,
                 "Newtons at the device per newton in the world.");
 
-  schema.Choice("device.kind", &settings.device.kind, {{"simulated", DeviceKind::kSimulated}, {"usb", DeviceKind::kUsb}},
+  schema.Choice("device.kind", &settings.device.kind,
+                {{"simulated", DeviceKind::kSimulated}, {"usb", DeviceKind::kUsb}},
                 "Which force display to drive.");
   schema.Path("device.file", &settings.device.file,
               "The file that describes the display, relative to this one.");
