@@ -21,7 +21,7 @@ class DeformableWorld final : public DynamicsWorld {
  public:
   /// Soft bodies take steps of this length: shorter ones would change nothing of what is felt, which is
   /// the body at rest, and cost more.
-  static constexpr double kStepS = 0.0125;
+  static constexpr double kStepS = 1.0 / 60;
 
   DeformableWorld(const Scene& scene, double longest_substep_s);
   ~DeformableWorld() override;

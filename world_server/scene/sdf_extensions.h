@@ -12,7 +12,7 @@
 //     <rikiseki:poisson_ratio>   of a soft link, 0 to 0.45; absent: 0.3
 //     <rikiseki:relaxation_s>    its damping: stress follows strain + relaxation * strain rate; 0 to 10,
 //                                absent: 0.02
-//     <rikiseki:element_size>    m, edge of its elements; absent: about 250 nodes
+//     <rikiseki:element_size>    m, edge of its elements; absent: about 200 nodes
 #pragma once
 
 #include <sdf/Element.hh>

@@ -10,7 +10,7 @@
 namespace rikiseki::world {
 namespace {
 
-constexpr double kUsualNodes = 250;
+constexpr double kUsualNodes = 200;
 constexpr double kTouch = 1e-3;    // of an element: as near is touching
 constexpr double kMostSag = 0.2;   // of the height, where the body's weight strains it most
 constexpr double kOnALine = 1e-6;  // of the extent

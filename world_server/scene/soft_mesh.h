@@ -18,7 +18,7 @@ struct SoftMesh {
   std::vector<std::uint8_t> held;  // by node: in or on a fixed body of the scene at the start
 };
 
-/// Edge [m] of the elements of a shape for which nothing is said: about 250 nodes.
+/// Edge [m] of the elements of a shape for which nothing is said: about 200 nodes.
 double UsualElement(const Shape& shape);
 
 /// Nodes of the mesh with these elements; 0 for a shape that is not meshed: boxes, spheres and

@@ -13,9 +13,10 @@ namespace rikiseki::world {
 namespace {
 
 // A floor, and a link with a collision of this shape and these elements, on lines 11 and 12; `more` is
-// other models.
+// other models, `beside` what stands in the same one.
 std::string Write(const std::string& elements, const std::string& shape, double z,
-                  const std::string& more = "", bool is_static = false) {
+                  const std::string& more = "", bool is_static = false,
+                  const std::string& beside = "") {
   const std::string path = std::filesystem::temp_directory_path() /
                            ("rikiseki_soft_" + std::to_string(getpid()) + ".sdf");
   std::ofstream(path)
@@ -28,8 +29,8 @@ std::string Write(const std::string& elements, const std::string& shape, double 
       << " 0 0 0</pose>\n<link name='l'>\n\n"
       << elements << "\n<collision name='c'><geometry>" << shape
       << "</geometry></collision>\n<inertial><mass>0.1</mass><inertia><ixx>1e-4</ixx>"
-         "<iyy>1e-4</iyy><izz>1e-4</izz></inertia></inertial>\n</link></model>"
-      << more << "</world></sdf>\n";
+         "<iyy>1e-4</iyy><izz>1e-4</izz></inertia></inertial>\n</link>"
+      << beside << "</model>" << more << "</world></sdf>\n";
   return path;
 }
 
@@ -60,7 +61,7 @@ TEST_CASE("a soft link is read, with what is absent at its default") {
   CHECK(softness.poisson_ratio == 0.3);
   CHECK(softness.relaxation_s == 0.02);
   const double nodes = SoftNodeCount(loaded.scene.bodies[1].colliders[0].shape, softness.element_m);
-  CHECK(nodes <= 250);
+  CHECK(nodes <= 200);
   CHECK(nodes > 100);
   CHECK_FALSE(loaded.scene.bodies[0].softness);
 
@@ -94,6 +95,25 @@ TEST_CASE(
   refuses(Refusal(soft, kBox, 0.03, true), {":11:", "static"});
   refuses(Refusal(soft, "<cylinder><radius>0.03</radius><length>0.06</length></cylinder>"),
           {":11:", "no <box>, <sphere> or <ellipsoid>"});
+}
+
+TEST_CASE("a soft link takes no joint, neither one that moves nor a fixed one") {
+  for (const std::string type : {"revolute", "fixed"}) {
+    const std::string beside =
+        "<link name='arm'><pose>0.2 0 0.5 0 0 0</pose><collision name='c'><geometry>" + kBox +
+        "</geometry></collision><inertial><mass>1</mass><inertia><ixx>1e-3</ixx><iyy>1e-3</iyy>"
+        "<izz>1e-3</izz></inertia></inertial></link><joint name='j' type='" +
+        type + "'><parent>l</parent><child>arm</child>" +
+        (type == "fixed" ? "" : "<axis><xyz>0 0 1</xyz></axis>") + "</joint>";
+    std::string why;
+    try {
+      LoadSdf(Write(E("youngs_modulus", "2e4"), kBox, 0.03, "", false, beside));
+    } catch (const ConfigError& error) {
+      why = error.what();
+    }
+    CAPTURE(type, why);
+    CHECK(why.find("joints hold rigid links only") != std::string::npos);
+  }
 }
 
 TEST_CASE("a rigid link that moves beside a soft one is warned of") {
