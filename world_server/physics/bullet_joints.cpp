@@ -14,6 +14,7 @@ namespace rikiseki::world {
 namespace {
 
 constexpr double kTorn = 1e-6;    // m or rad: no substep leaves a joint so far apart
+constexpr double kSlips = 1e-9;   // m/s: slower, there is no direction of slip
 constexpr double kMoved = 1e-12;  // m: Bullet moved a body otherwise than by its velocity
 
 // One row for Bullet's solver: the rate is to become `rate`, by an impulse within the bounds.
@@ -185,8 +186,47 @@ std::span<const std::size_t> BulletJoints::Settle(std::size_t moving) {
   return joined->places;
 }
 
-void BulletJoints::BeginSubstep(std::span<const std::size_t> stepped, double step_s) {
+// Friction is aimed along the true slip, and across it: with what the joints gave last in the velocities, as
+// the solver sees them, wheels would seem to slip along their axles, and nothing would make them roll.
+void BulletJoints::AimFriction(std::span<btPersistentManifold* const> manifolds) const {
+  for (btPersistentManifold* manifold : manifolds) {
+    const auto& first = *static_cast<const btRigidBody*>(manifold->getBody0());
+    const auto& second = *static_cast<const btRigidBody*>(manifold->getBody1());
+    if (!IsJoined(first) && !IsJoined(second)) continue;
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      btManifoldPoint& point = manifold->getContactPoint(i);
+      const btVector3 held = point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
+                             point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2;
+      const btVector3& normal = point.m_normalWorldOnB;
+      const auto velocity = [&](const btRigidBody& body) {
+        return body.getVelocityInLocalPoint(point.getPositionWorldOnB() -
+                                            body.getCenterOfMassPosition());
+      };
+      btVector3 slip = velocity(first) - velocity(second);
+      slip -= slip.dot(normal) * normal;
+      if (slip.length() > kSlips) {
+        point.m_lateralFrictionDir1 = slip.normalized();
+        point.m_lateralFrictionDir2 = normal.cross(point.m_lateralFrictionDir1);
+      } else {
+        btPlaneSpace1(normal, point.m_lateralFrictionDir1, point.m_lateralFrictionDir2);
+      }
+      point.m_contactPointFlags |= BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
+      point.m_appliedImpulseLateral1 = held.dot(point.m_lateralFrictionDir1);
+      point.m_appliedImpulseLateral2 = held.dot(point.m_lateralFrictionDir2);
+    }
+  }
+}
+
+bool BulletJoints::IsJoined(const btRigidBody& rigid) const {
+  const int place = rigid.getUserIndex();
+  return place >= 0 && joined_of_[static_cast<std::size_t>(place)] != nullptr;
+}
+
+void BulletJoints::BeginSubstep(std::span<btPersistentManifold* const> manifolds,
+                                std::span<const std::size_t> stepped, double step_s) {
   stepped_.clear();
+  if (joined_.empty()) return;
+  AimFriction(manifolds);
   for (const std::size_t place : stepped) {
     Joined* found = joined_of_[place];
     if (found == nullptr || found->places.front() != place) continue;

@@ -26,8 +26,10 @@ class BulletJoints {
   /// places in `moving` whose velocities that changed; none without a joint.
   std::span<const std::size_t> Settle(std::size_t moving);
 
-  /// Of the bodies that are stepped, places in `moving`; after the drag, before the solver.
-  void BeginSubstep(std::span<const std::size_t> stepped, double step_s);
+  /// Of the bodies that are stepped, places in `moving`, and their contacts; after the drag, before the
+  /// solver.
+  void BeginSubstep(std::span<btPersistentManifold* const> manifolds,
+                    std::span<const std::size_t> stepped, double step_s);
 
   /// Of the same bodies, after the hooks' EndSubstep, which leaves jointed bodies to this.
   /// `manifolds` are theirs.
@@ -37,6 +39,8 @@ class BulletJoints {
   struct Joined;
 
   void IgnorePairs(const Scene& scene);
+  bool IsJoined(const btRigidBody& rigid) const;
+  void AimFriction(std::span<btPersistentManifold* const> manifolds) const;
   void Read(const Joined& joined, std::span<BodyState> states) const;
   void WriteVelocities(const Joined& joined, std::span<const BodyState> states);
   bool Touches(const Joined& joined, std::span<btPersistentManifold* const> manifolds) const;

@@ -208,7 +208,7 @@ void GroupedWorld::Step(const Group& group, double step_s, int sweeps) {
   FindContacts(group, step_s);
   BeginSubstep(bodies_.moving, stepped_);
   if (parts_.drag) BlowAir(step_s);
-  jointed_->BeginSubstep(stepped_, step_s);
+  jointed_->BeginSubstep(manifolds_, stepped_, step_s);
   Solve(group, step_s);
   integrateTransformsInternal(rigids_.data(), static_cast<int>(rigids_.size()), step_s);
   EndSubstep(manifolds_, bodies_.moving, stepped_, step_s, parts_.rotation);

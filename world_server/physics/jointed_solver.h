@@ -1,5 +1,6 @@
 // Bullet's solver, with as many sweeps as an island with joints takes: fifty are enough for contacts,
-// but a wagon of 5 kg on wheels of 50 g would creep by 20 um/s where it stands.
+// but a wagon of 5 kg on wheels of 50 g would creep by 20 um/s where it stands. Friction of what is jointed
+// acts in the directions in which it was aimed (bullet_joints.h), in both.
 #pragma once
 
 #include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
@@ -19,6 +20,8 @@ class JointedSolver : public btSequentialImpulseConstraintSolver {
     if (constraint_count > 0) {
       own.m_numIterations = kMostSweeps;
       own.m_leastSquaresResidualThreshold = kSettled;
+      own.m_solverMode |=
+          SOLVER_USE_2_FRICTION_DIRECTIONS | SOLVER_ENABLE_FRICTION_DIRECTION_CACHING;
     }
     return btSequentialImpulseConstraintSolver::solveGroup(
         bodies, body_count, manifolds, manifold_count, constraints, constraint_count, own, drawer,

@@ -91,6 +91,8 @@ class Algorithm final : public btCollisionAlgorithm {
     point.m_appliedImpulse = last[nearest].m_appliedImpulse;
     point.m_appliedImpulseLateral1 = last[nearest].m_appliedImpulseLateral1;
     point.m_appliedImpulseLateral2 = last[nearest].m_appliedImpulseLateral2;
+    point.m_lateralFrictionDir1 = last[nearest].m_lateralFrictionDir1;
+    point.m_lateralFrictionDir2 = last[nearest].m_lateralFrictionDir2;
     point.m_prevRHS = last[nearest].m_prevRHS;
     point.m_lifeTime = last[nearest].m_lifeTime;
     last.erase(last.begin() + static_cast<std::ptrdiff_t>(nearest));

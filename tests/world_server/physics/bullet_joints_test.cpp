@@ -364,8 +364,10 @@ TEST_CASE("a wagon stands still, and rolls without slipping or loss") {
   for (int i = 0; i < 20; ++i) world.ApplyAndStep({}, 0.05);
   CAPTURE(world.State(1).velocity.x() / speed - 1,
           world.State(2).angular_velocity.y() * radius / speed - 1);
-  CHECK(world.State(2).angular_velocity.y() == Approx(speed / radius).epsilon(0.02));
-  CHECK(world.State(1).velocity.x() == Approx(speed).epsilon(0.02));
+  for (std::size_t wheel = 2; wheel < 6; ++wheel) {
+    CHECK(world.State(wheel).angular_velocity.y() == Approx(speed / radius).epsilon(1e-6));
+  }
+  CHECK(world.State(1).velocity.x() == Approx(speed).epsilon(1e-6));
   CHECK(std::abs(world.State(1).velocity.y()) < 1e-3);
   CHECK(Apart(scene, States(world)) < 1e-11);
 }

@@ -238,7 +238,7 @@ TEST_CASE("a wrong rikiseki element is refused with file, line, name and what wo
       "stands twice");
   refused("\n<rikiseki:softness>1</rikiseki:softness>",
           "<rikiseki:static_friction> and <rikiseki:recovery_s> in the <surface> of a collision, "
-          "<rikiseki:drag> and <rikiseki:angular_drag> in the <link> of a model do");
+          "<rikiseki:drag> and <rikiseki:angular_drag> in the <link> of a model, ");
   // Known, but in the wrong place.
   const std::string misplaced = Refusal(
       World("<model name=\"m\"><static>1</static>\n<rikiseki:recovery_s>1</rikiseki:recovery_s>"
