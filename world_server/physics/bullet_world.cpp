@@ -267,6 +267,7 @@ void BulletWorld::SetState(std::size_t body, const BodyState& state) {
   const std::size_t place = engine_->bodies.moving_of[body];
   engine_->sleepers.Wake(place);
   engine_->bodies.moving[place].SetState(state);
+  engine_->reached[place] = 1;  // for all that is known of it
   engine_->islands.UpdateBox(place);
   states_[body] = state;
 }
