@@ -71,10 +71,7 @@ class TurnedDevice final : public haptic::Device {
 
 std::unique_ptr<world::DynamicsWorld> DynamicsOf(const Touch& touch) {
   const double substep_s = touch.world.physics.substep_ms * 1e-3;
-  const bool deforms =
-      std::any_of(touch.scene.bodies.begin(), touch.scene.bodies.end(),
-                  [](const world::SceneBody& body) { return body.softness.has_value(); });
-  if (!touch.parts || deforms) return world::MakeDynamics(touch.scene, substep_s);
+  if (!touch.parts || Deforms(touch.scene)) return world::MakeDynamics(touch.scene, substep_s);
   return std::make_unique<world::BulletWorld>(touch.scene, substep_s, *touch.parts);
 }
 
