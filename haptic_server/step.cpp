@@ -23,6 +23,7 @@ using protocol::ForceReason;
 using protocol::PeerState;
 
 constexpr std::uint32_t kPointer = 0;
+
 // The acks of frames lie a few world periods back; a world that stalls for seconds resumes with new
 // ticks.
 std::uint64_t HistoryTicks(const Settings& settings) {

@@ -16,8 +16,7 @@ constexpr std::chrono::milliseconds kLook(250);
 ReadyScene LoadScene(const Settings& settings) {
   ReadyScene ready;
   ready.loaded = LoadSdf(settings.scene.file);
-  ready.dynamics =
-      MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
+  ready.dynamics = MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
   return ready;
 }
 

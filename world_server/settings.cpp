@@ -12,8 +12,9 @@ void Bind(ConfigSchema& schema, Settings& settings) {
   schema.Path("scene.file", &settings.scene.file, "the SDFormat world to run");
   schema.Flag("scene.watch", &settings.scene.watch,
               "whether the running scene follows its files as they are edited");
-  schema.Number("physics.substep_ms", &settings.physics.substep_ms, 0.05, 10,
-                "longest step of bodies that a push reaches; the others choose theirs by themselves");
+  schema.Number(
+      "physics.substep_ms", &settings.physics.substep_ms, 0.05, 10,
+      "longest step of bodies that a push reaches; the others choose theirs by themselves");
   schema.Choice<protocol::Coupling>(
       "coupling.coupling", &settings.coupling.coupling,
       {{"position", protocol::Coupling::kPosition},

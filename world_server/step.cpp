@@ -137,7 +137,7 @@ void WorldStep::State::Push(std::span<const Kick> kicks, double period_s) {
 
 // Coupling and physics.
 void WorldStep::State::Advance(double period_s) {
-  const std::span<const PendingImpulse> owed = ledger.Take();
+  const std::span<const PlacedImpulse> owed = ledger.Take();
   if (settings.coupling.coupling == protocol::Coupling::kPosition) {
     Penalise(period_s);
   } else if (settings.coupling.coupling == protocol::Coupling::kLocal &&

@@ -64,7 +64,7 @@ class FeatureTrack {
 
  private:
   struct Feature {
-    protocol::Plane identity;         // and own stiffness and damping: the last ones
+    protocol::Plane identity;  // and own stiffness and damping: the last ones
     double previous_stiffness = 0, previous_damping = 0;
     bool rides = false;               // points and normals below are in the body's frame, else in W
     Pose pose_WB;                     // where its copy was last

@@ -173,7 +173,8 @@ TEST_CASE("a file that cannot be read is refused with its path and the reason") 
                     folder + ": the configuration cannot be read: Is a directory");
 }
 
-TEST_CASE("a path is relative to the file that gives it; with --set, to the working directory") {
+TEST_CASE(
+    "a path is relative to the file that gives it, and with --set, to the working directory") {
   const TemporaryFile file("[bowl]\npicture = ../a/./b.png\n");
   const std::filesystem::path folder = std::filesystem::path(file.path()).parent_path();
   Bowl bowl;

@@ -226,7 +226,7 @@ TEST_CASE(
   REQUIRE(bench.Run(400).norm() == Approx(4).epsilon(1e-6));
 }
 
-TEST_CASE("Stop lets go and says so; the books take no more") {
+TEST_CASE("Stop lets go and says so, and the books take no more") {
   Bench bench;
   bench.Run(400);
   const std::uint64_t tick = bench.message.tick;
@@ -646,7 +646,8 @@ struct BareDevice {
   bool braked = false;
 };
 
-TEST_CASE("an unstable contact is flagged in health; the controller keeps it stable and says so") {
+TEST_CASE(
+    "an unstable contact is flagged in health, and the controller keeps it stable and says so") {
   Settings settings;
   settings.safety.soft_start_ms = 0;
   settings.render.stiffness_n_per_m = 4000;  // ten times what the device bears without damping

@@ -111,7 +111,10 @@ TEST_CASE("a copy alone ends where the engine ends, along one line") {
       CAPTURE(static_cast<int>(script), mass_kg);
       const PushResult engine = SimulateCubePush(push, {});
       const PushResult copy = SimulateCopyAlone(push);
-      CHECK(copy.displacement_m == Approx(engine.displacement_m).epsilon(1e-4));
+      // The engine adds the last way of what comes to stick within a substep, at most mu g h^2/2 for each
+      // stop (bullet_hooks.cpp); a copy does not know the speed before the push.
+      const double last_way_m = push.friction * 9.81 * 1e-6 / 2;
+      CHECK(copy.displacement_m == Approx(engine.displacement_m).epsilon(1e-4).margin(last_way_m));
       CHECK(copy.force_peak_n == Approx(engine.force_peak_n).epsilon(1e-4));
     }
   }

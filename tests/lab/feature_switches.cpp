@@ -128,6 +128,40 @@ FeatureSwitch::Change SoftStart(double soft_start_ms) {
   return [=](Touch& touch) { touch.haptic.safety.soft_start_ms = soft_start_ms; };
 }
 
+FeatureSwitch::Change EachBody(std::function<void(world::SceneBody&)> change) {
+  return [change](Touch& touch) {
+    for (world::SceneBody& body : touch.scene.bodies) change(body);
+  };
+}
+
+FeatureSwitch::Change EachCollider(std::function<void(world::Collider&)> change) {
+  return EachBody([change](world::SceneBody& body) {
+    for (world::Collider& collider : body.colliders) change(collider);
+  });
+}
+
+// The engine with all its parts, whatever the scene needs.
+void AllParts(Touch& touch) {
+  touch.parts = world::EngineParts();
+}
+
+FeatureSwitch::Change Without(bool world::EngineParts::*part) {
+  return [part](Touch& touch) {
+    AllParts(touch);
+    (*touch.parts).*part = false;
+  };
+}
+
+// What is touched, alone and weightless: it meets nothing but the finger.
+void Alone(Touch& touch) {
+  std::vector<world::SceneBody>& bodies = touch.scene.bodies;
+  const auto moving = std::find_if(bodies.begin(), bodies.end(),
+                                   [](const world::SceneBody& body) { return !body.fixed; });
+  bodies = {moving == bodies.end() ? bodies.front() : *moving};
+  touch.scene.joints.clear();
+  touch.scene.gravity.setZero();
+}
+
 void Mapped(Touch& touch) {
   touch.haptic.mapping = {.origin_mm = Vec3(10, -20, 30),
                           .rotation_deg = Vec3(0, 0, 30),
@@ -159,6 +193,17 @@ std::vector<FeatureSwitch> FeatureSwitches() {
     if (plane.inverse_mass > 0) plane.inverse_mass = protocol::kMobilityNotSaid;
   });
   const haptic::RenderSettings usual;
+  using world::EngineParts;
+  const auto in_air = EachBody([](world::SceneBody& body) { body.drag_ns_per_m = 1; });
+  const auto in_vacuum =
+      EachBody([](world::SceneBody& body) { body.drag_ns_per_m = body.angular_drag_nms = 0; });
+  const auto restitution = [](double value) {
+    return EachCollider([value](world::Collider& collider) { collider.restitution = value; });
+  };
+  const auto unequal = EachBody([](world::SceneBody& body) { body.inertia(0, 0) *= 1.5; });
+  const auto equal = EachBody(
+      [](world::SceneBody& body) { body.inertia = body.inertia.trace() / 3 * Mat3::Identity(); });
+  const auto frictionless = EachCollider([](world::Collider& collider) { collider.friction = 0; });
   return {
       {"finger friction", FingerFriction(0.5), All({FingerFriction(0.5), smooth}),
        FingerFriction(0), true},
@@ -184,6 +229,17 @@ std::vector<FeatureSwitch> FeatureSwitches() {
        true},
       {"light damping", LightDamping(1, 0.01), LightDamping(1, 3), LightDamping(0, 3), true},
       {"soft start", SoftStart(1000), SoftStart(200), SoftStart(0), true},
+      {"air drag", in_air, All({in_vacuum, AllParts}),
+       All({in_vacuum, Without(&EngineParts::drag)}), true},
+      {"restitution", restitution(0.5), All({restitution(0), AllParts}),
+       All({restitution(0), Without(&EngineParts::rebound)}), true},
+      {"precession", unequal, All({equal, AllParts}), All({equal, Without(&EngineParts::rotation)}),
+       true},
+      {"contacts of bodies", AsItIs, All({Alone, AllParts}),
+       All({Alone, Without(&EngineParts::contacts)}), true},
+      {"friction of bodies", AsItIs, All({frictionless, AllParts}),
+       All({frictionless, Without(&EngineParts::friction)}), true},
+      {"fast bodies", AllParts, AllParts, Without(&EngineParts::fast_bodies), false},
       {"limits", Limits(0.5, 50, 3), Limits(1e6, 1e9, 1e6), Limits(1e9, 1e15, 1e9), true},
   };
 }

@@ -302,7 +302,7 @@ TEST_CASE("the displayed surface moves as the rules say") {
   }
 }
 
-TEST_CASE("rows of masses that make no sense are refused; a hand may be given by its numbers") {
+TEST_CASE("rows of masses that make no sense are refused, and a hand may be given by its numbers") {
   const auto run = [](const std::string& row) -> std::string {
     std::istringstream in(
         "Tw_s,kp_N_m,kd_Ns_m,hand,method,frame_latency_ticks,M_min_kg,"

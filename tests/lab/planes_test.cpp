@@ -105,7 +105,7 @@ TEST_CASE("the residual tells a solution from what is none") {
   CHECK(ResidualOf(finger, planes, solution) == Approx(1e-6).epsilon(0.5));
 }
 
-TEST_CASE("rows of planes that make no sense are refused; too many planes are not supported") {
+TEST_CASE("rows of planes that make no sense are refused, and too many planes are not supported") {
   CHECK(Refusal(kInputs + "\n0,0,0,2,0 0 0 0 1 0\n").starts_with("t.csv:2: n_planes = 2: "));
   CHECK(Refusal(kInputs + "\n0,0,0,1,0 0 0 0 1\n").starts_with("t.csv:2: planes px py pz"));
   CHECK(Refusal(kInputs + "\nnan,0,0,0,\n").starts_with("t.csv:2: Cx = nan"));

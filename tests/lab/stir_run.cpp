@@ -188,10 +188,9 @@ StirResult SimulateStir(const Stir& stir) {
   for (const haptic::Stroke& stroke : script.strokes) script_s += stroke.duration_s;
   IdealDevice device(haptic::Hand(haptic::MotorProgram(script), kHand),
                      CoupledRun::StartNs(haptic_settings) + lead * haptic_settings.period_ns());
-  CoupledRun run(
-      haptic_settings, device, world_settings, stir.scene,
-      world::MakeDynamics(stir.scene, world_settings.physics.substep_ms * 1e-3),
-      /*phase_ticks=*/0);
+  CoupledRun run(haptic_settings, device, world_settings, stir.scene,
+                 world::MakeDynamics(stir.scene, world_settings.physics.substep_ms * 1e-3),
+                 /*phase_ticks=*/0);
   Watch watch(stir.scene, haptic_settings, run);
   for (long long k = 0; k < lead + ticks(script_s); ++k) {
     const bool world_ticked = run.Tick();

@@ -12,6 +12,7 @@
 #include "protocol/codec.h"
 #include "tests/lab/coupled_run.h"
 #include "tests/lab/ideal_device.h"
+#include "world_server/physics/bullet_world.h"
 #include "world_server/physics/deformable_world.h"
 #include "world_server/step.h"
 
@@ -67,6 +68,12 @@ class TurnedDevice final : public haptic::Device {
   double force_scale_;
   bool is_plain_;
 };
+
+std::unique_ptr<world::DynamicsWorld> DynamicsOf(const Touch& touch) {
+  const double substep_s = touch.world.physics.substep_ms * 1e-3;
+  if (!touch.parts || Deforms(touch.scene)) return world::MakeDynamics(touch.scene, substep_s);
+  return std::make_unique<world::BulletWorld>(touch.scene, substep_s, *touch.parts);
+}
 
 Vec3 Across(const Vec3& normal) {
   const Vec3 axis = std::abs(normal.z()) < 0.7 ? Vec3::UnitZ() : Vec3::UnitY();
@@ -148,8 +155,7 @@ TouchResult RunTouch(const Touch& touch) {
   IdealDevice hand(haptic::Hand([&touch](double t_s) { return HandTarget(touch, t_s); }, kHand),
                    CoupledRun::StartNs(touch.haptic) + ticks(kLead) * period_ns);
   TurnedDevice device(hand, touch.haptic.mapping);
-  CoupledRun run(touch.haptic, device, touch.world, touch.scene,
-                 world::MakeDynamics(touch.scene, touch.world.physics.substep_ms * 1e-3),
+  CoupledRun run(touch.haptic, device, touch.world, touch.scene, DynamicsOf(touch),
                  /*phase_ticks=*/0);
   if (touch.alter_frame) run.AlterFrames(touch.alter_frame);
   for (long long k = 0; k < ticks(kLead); ++k) {

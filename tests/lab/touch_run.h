@@ -4,11 +4,13 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "common/geometry.h"
 #include "haptic_server/settings.h"
 #include "protocol/messages.h"
+#include "world_server/physics/engine_parts.h"
 #include "world_server/scene/scene.h"
 #include "world_server/settings.h"
 
@@ -22,6 +24,7 @@ struct Touch {
   Vec3 place = Vec3::Zero();    // m, on the surface that is touched, in W
   Vec3 normal = Vec3::UnitX();  // unit, out of it
   std::function<void(protocol::WorldFrame&)> alter_frame = {};  // on its way to the haptic side
+  std::optional<world::EngineParts> parts = {};  // of the engine; none = what the scene needs
   bool clutches_first = false;  // the operator pulls the clutch once, before the hand moves
 };
 

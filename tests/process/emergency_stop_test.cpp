@@ -129,7 +129,7 @@ class OnTerminal {
 
 }  // namespace
 
-TEST_CASE("SIGUSR1 in contact: no force at once and for good; SIGUSR2 brings it back softly") {
+TEST_CASE("SIGUSR1 in contact: no force at once and for good, and SIGUSR2 brings it back softly") {
   const Instance instance;
   Child world(WorldCommand(instance));
   Child haptic(HapticCommand(instance));
@@ -178,7 +178,7 @@ TEST_CASE("a stop that comes before the world keeps the force away when the worl
   CheckSafe(watch);
 }
 
-TEST_CASE("keys of the terminal stop, enable and clutch; it gets its settings back") {
+TEST_CASE("keys of the terminal stop, enable and clutch, and it gets its settings back") {
   const Instance instance;
   Child world(WorldCommand(instance));
   OnTerminal haptic(HapticCommand(instance));

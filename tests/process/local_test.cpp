@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <sstream>
 
-#include "common/histogram.h"
 #include "tests/common/temporary_file.h"
 #include "tests/lab/buzz_run.h"
 #include "tests/process/child.h"
@@ -78,16 +77,6 @@ class LightPair {
   Child world_;
   Child haptic_;
 };
-
-// How often the machine kept a loop from its deadline: late by more than a tick at 1 kHz, or by more than a tenth
-// of a period of the world.
-std::uint64_t Disturbances(const protocol::PeerView& haptic, const protocol::PeerView& world) {
-  const protocol::WorldHealth health = ReadWorldHealth(world);
-  std::uint64_t late = health.missed;
-  const std::size_t first = HistogramBucket(static_cast<std::int64_t>(health.period_ns / 10));
-  for (std::size_t i = first; i < health.lateness.size(); ++i) late += health.lateness[i];
-  return late + ReadHapticHealth(haptic).missed;
-}
 
 // Of the ticks with these numbers, in their order; a tick that was lost or skipped shows the force that
 // was held.

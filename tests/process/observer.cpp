@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "common/histogram.h"
 #include "protocol/stream.h"
 
 namespace rikiseki::test {
@@ -136,6 +137,14 @@ protocol::WorldHealth ReadWorldHealth(const protocol::PeerView& view) {
 
 protocol::WorldFrame ReadWorldFrame(const protocol::PeerView& view) {
   return ReadNewest<protocol::WorldFrame>(view);
+}
+
+std::uint64_t Disturbances(const protocol::PeerView& haptic, const protocol::PeerView& world) {
+  const protocol::WorldHealth health = ReadWorldHealth(world);
+  std::uint64_t late = health.missed;
+  const std::size_t first = HistogramBucket(static_cast<std::int64_t>(health.period_ns / 10));
+  for (std::size_t i = first; i < health.lateness.size(); ++i) late += health.lateness[i];
+  return late + ReadHapticHealth(haptic).missed;
 }
 
 protocol::Body ReadMovingBody(const protocol::PeerView& view) {

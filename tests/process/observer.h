@@ -72,6 +72,10 @@ protocol::WorldFrame ReadWorldFrame(const protocol::PeerView& view);
 /// The first body that can move.
 protocol::Body ReadMovingBody(const protocol::PeerView& view);
 
+/// How often the machine kept a loop of the pair from its deadline: late by more than a tick at 1 kHz, or
+/// by more than a tenth of a period of the world.
+std::uint64_t Disturbances(const protocol::PeerView& haptic, const protocol::PeerView& world);
+
 double Norm(const protocol::Vector& v);
 /// Length of an impulse, N s.
 double Norm(const protocol::ImpulseUnits& units);

@@ -23,6 +23,8 @@ using protocol::Role;
 constexpr double kSlewLimit = 5000;  // N/s
 // The finger rests at 2 N; two counts of the encoders, 0.06 mm, make 0.12 N at 2 kN/m.
 constexpr double kStill = 0.2;  // N
+// A late tick moves the hand; a wall that went for a moment would take all of the 2 N.
+constexpr double kDisturbed = 1;  // N
 
 std::string Cube(const std::string& name, const std::string& place) {
   return "<model name=\"" + name + "\"><pose>" + place +
@@ -67,13 +69,15 @@ TEST_CASE("a scene is edited under a resting finger, which feels nothing of it")
   REQUIRE(Eventually([&] { return watch.Latest().force > 1.8; }));
   std::this_thread::sleep_for(std::chrono::seconds(1));  // until the hand has come to rest
   const std::size_t from = watch.All().size();
+  const std::uint64_t disturbances = Disturbances(*haptic_view, *world_view);
   const auto resets = [&] { return ReadWorldHealth(*world_view).resets; };
   const auto still = [&] {
     const std::vector<WatchedTick> all = watch.All();
     const auto [low, high] = std::minmax_element(
         all.begin() + static_cast<std::ptrdiff_t>(from), all.end(),
         [](const WatchedTick& a, const WatchedTick& b) { return a.force < b.force; });
-    CHECK(high->force - low->force <= kStill);
+    const bool in_time = Disturbances(*haptic_view, *world_view) == disturbances;
+    CHECK(high->force - low->force <= (in_time ? kStill : kDisturbed));
   };
   const std::vector<protocol::Body> before = ReadBodies(*world_view);
   REQUIRE(before.size() == 3);

@@ -134,7 +134,7 @@ TEST_CASE("a clean close is seen at once, and the name is free") {
   CHECK(test::IsNumbered(got));
 }
 
-TEST_CASE("a fault is a state that comes and goes; the segment can still be attached") {
+TEST_CASE("a fault is a state that comes and goes, and the segment can still be attached") {
   const TemporaryFolder folder;
   const std::string instance = FreshInstance();
   SegmentOwner owner(HapticOptions(instance, folder.path()));

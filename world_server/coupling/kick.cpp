@@ -51,19 +51,11 @@ Overlap SoftOverlap(const SoftSurface& soft, const Collider& collider, const Pos
 
 }  // namespace
 
-Kick KickAtCentre(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse,
-                  const BodyState& state) {
-  return {.body = body,
-          .impulse = impulse,
-          .angular_impulse = angular_impulse - state.pose.position.cross(impulse)};
-}
-
-std::vector<Kick> ImpulseKicks(std::span<const PendingImpulse> owed,
+std::vector<Kick> ImpulseKicks(std::span<const PlacedImpulse> owed,
                                std::span<const BodyState> states) {
   std::vector<Kick> kicks;
-  for (const PendingImpulse& pending : owed) {
-    kicks.push_back(
-        KickAtCentre(pending.body, pending.impulse, pending.angular_impulse, states[pending.body]));
+  for (const PlacedImpulse& push : owed) {
+    kicks.push_back(KickOf(push, states[push.body].pose.position));
   }
   return kicks;
 }

@@ -6,20 +6,14 @@
 #include <span>
 #include <vector>
 
-#include "world_server/coupling/ledger_reader.h"
 #include "world_server/features/planes.h"
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/scene/scene.h"
 
 namespace rikiseki::world {
 
-/// The angular impulse [N m s] is shifted from the world origin to the centre of mass c where it is
-/// now: L_c = L - c x J.
-Kick KickAtCentre(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse,
-                  const BodyState& state);
-
 /// `impulse`: one kick per body, at its present centre.
-std::vector<Kick> ImpulseKicks(std::span<const PendingImpulse> owed,
+std::vector<Kick> ImpulseKicks(std::span<const PlacedImpulse> owed,
                                std::span<const BodyState> states);
 
 /// What `position` renders with.

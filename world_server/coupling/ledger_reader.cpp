@@ -188,7 +188,7 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
   return true;
 }
 
-std::span<const PendingImpulse> LedgerReader::Take() {
+std::span<const PlacedImpulse> LedgerReader::Take() {
   taken_.clear();
   ImpulseUnits sum{}, sum_before{};
   for (std::size_t body = 0; body < owed_.size(); ++body) {

@@ -14,6 +14,7 @@
 
 #include "common/geometry.h"
 #include "protocol/messages.h"
+#include "world_server/physics/dynamics_world.h"
 
 namespace rikiseki::world {
 
@@ -23,13 +24,6 @@ struct BodyTag {
   std::uint32_t generation = 0;
   bool movable = false;
   std::size_t place = 0;
-};
-
-/// What one body is owed, about the world origin, in W.
-struct PendingImpulse {
-  std::size_t body = 0;                 // its place in the scene
-  Vec3 impulse = Vec3::Zero();          // N s
-  Vec3 angular_impulse = Vec3::Zero();  // N m s
 };
 
 /// What one body got within a ReplayTick, about the world origin, in W.
@@ -82,7 +76,7 @@ class LedgerReader {
   bool Consume(const protocol::HapticTick& tick);
 
   /// Hands out what every body is owed, which counts as applied, and closes the world tick.
-  std::span<const PendingImpulse> Take();
+  std::span<const PlacedImpulse> Take();
 
   /// The same, message by message, of the last Take(); empty unless the coupling is `local`.
   const Replay& replay() const { return taken_replay_; }
@@ -139,7 +133,7 @@ class LedgerReader {
   std::vector<OwedUnits> owed_;
   double consumed_ns_ = 0;   // sum of |q| over this world tick
   double consumed_nms_ = 0;  // of the angular ones
-  std::vector<PendingImpulse> taken_;
+  std::vector<PlacedImpulse> taken_;
   Replay replay_;        // by number
   Replay taken_replay_;  // by place
 

@@ -32,6 +32,10 @@ PrincipalInertia Diagonalize(const Mat3& inertia) {
 
 }  // namespace
 
+double MovingBody::Speed() const {
+  return rigid->getLinearVelocity().length() + outer_radius * rigid->getAngularVelocity().length();
+}
+
 BodyState MovingBody::State() const {
   return {.pose = FromBullet(rigid->getWorldTransform()) * Pose{.orientation = q_BP.conjugate()},
           .velocity = FromBullet(rigid->getLinearVelocity()),

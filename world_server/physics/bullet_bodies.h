@@ -38,6 +38,8 @@ struct MovingBody {
   Vec3 last_velocity = Vec3::Zero();  // m/s, at the end of the last substep, before any kick
   double last_step_s = 0;             // length of the last substep that it was in
 
+  /// No point of it is faster [m/s].
+  double Speed() const;
   /// In the scene body's frame.
   BodyState State() const;
   void SetState(const BodyState& state);

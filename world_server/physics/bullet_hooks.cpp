@@ -13,17 +13,6 @@ const btRigidBody* Body(const btCollisionObject* object) {
   return btRigidBody::upcast(object);
 }
 
-// Tangential relative velocity at a contact point.
-Vec3 Slip(const btPersistentManifold& manifold, const btManifoldPoint& point) {
-  const auto velocity = [](const btRigidBody* body, const btVector3& where) {
-    return body->getVelocityInLocalPoint(where - body->getWorldTransform().getOrigin());
-  };
-  const btVector3 relative = velocity(Body(manifold.getBody0()), point.getPositionWorldOnA()) -
-                             velocity(Body(manifold.getBody1()), point.getPositionWorldOnB());
-  const btVector3& normal = point.m_normalWorldOnB;
-  return FromBullet(relative - relative.dot(normal) * normal);
-}
-
 // The way that a body slid before it came to stick within the substep: as friction can brake it, at most
 // as long as the substep. Not where a kick came, which friction may have undone.
 Vec3 LastWay(const MovingBody& body, double step_s) {
@@ -36,6 +25,16 @@ Vec3 LastWay(const MovingBody& body, double step_s) {
 }
 
 }  // namespace
+
+Vec3 Slip(const btPersistentManifold& manifold, const btManifoldPoint& point) {
+  const auto velocity = [](const btRigidBody* body, const btVector3& where) {
+    return body->getVelocityInLocalPoint(where - body->getWorldTransform().getOrigin());
+  };
+  const btVector3 relative = velocity(Body(manifold.getBody0()), point.getPositionWorldOnA()) -
+                             velocity(Body(manifold.getBody1()), point.getPositionWorldOnB());
+  const btVector3& normal = point.m_normalWorldOnB;
+  return FromBullet(relative - relative.dot(normal) * normal);
+}
 
 void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> stepped) {
   for (const std::size_t place : stepped) {

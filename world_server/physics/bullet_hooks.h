@@ -16,6 +16,9 @@ class btPersistentManifold;
 
 namespace rikiseki::world {
 
+/// Tangential velocity of the first body against the second at a contact point [m/s, W].
+Vec3 Slip(const btPersistentManifold& manifold, const btManifoldPoint& point);
+
 /// Remembers velocities and attitudes of the stepped bodies, places in `moving`. After the kicks, before
 /// the solver.
 void BeginSubstep(std::vector<MovingBody>& moving, std::span<const std::size_t> stepped);

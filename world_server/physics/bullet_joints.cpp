@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "world_server/physics/bullet_hooks.h"
 #include "world_server/physics/bullet_math.h"
 #include "world_server/physics/linkage.h"
 
@@ -190,20 +191,15 @@ std::span<const std::size_t> BulletJoints::Settle(std::size_t moving) {
 // the solver sees them, wheels would seem to slip along their axles, and nothing would make them roll.
 void BulletJoints::AimFriction(std::span<btPersistentManifold* const> manifolds) const {
   for (btPersistentManifold* manifold : manifolds) {
-    const auto& first = *static_cast<const btRigidBody*>(manifold->getBody0());
-    const auto& second = *static_cast<const btRigidBody*>(manifold->getBody1());
-    if (!IsJoined(first) && !IsJoined(second)) continue;
+    if (JoinedOf(*manifold->getBody0()) == nullptr && JoinedOf(*manifold->getBody1()) == nullptr) {
+      continue;
+    }
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
       btManifoldPoint& point = manifold->getContactPoint(i);
       const btVector3 held = point.m_appliedImpulseLateral1 * point.m_lateralFrictionDir1 +
                              point.m_appliedImpulseLateral2 * point.m_lateralFrictionDir2;
       const btVector3& normal = point.m_normalWorldOnB;
-      const auto velocity = [&](const btRigidBody& body) {
-        return body.getVelocityInLocalPoint(point.getPositionWorldOnB() -
-                                            body.getCenterOfMassPosition());
-      };
-      btVector3 slip = velocity(first) - velocity(second);
-      slip -= slip.dot(normal) * normal;
+      const btVector3 slip = ToBullet(Slip(*manifold, point));
       if (slip.length() > kSlips) {
         point.m_lateralFrictionDir1 = slip.normalized();
         point.m_lateralFrictionDir2 = normal.cross(point.m_lateralFrictionDir1);
@@ -217,9 +213,9 @@ void BulletJoints::AimFriction(std::span<btPersistentManifold* const> manifolds)
   }
 }
 
-bool BulletJoints::IsJoined(const btRigidBody& rigid) const {
-  const int place = rigid.getUserIndex();
-  return place >= 0 && joined_of_[static_cast<std::size_t>(place)] != nullptr;
+const BulletJoints::Joined* BulletJoints::JoinedOf(const btCollisionObject& object) const {
+  const int place = object.getUserIndex();
+  return place < 0 ? nullptr : joined_of_[static_cast<std::size_t>(place)];
 }
 
 void BulletJoints::BeginSubstep(std::span<btPersistentManifold* const> manifolds,
@@ -260,12 +256,10 @@ void BulletJoints::BeginSubstep(std::span<btPersistentManifold* const> manifolds
 
 bool BulletJoints::Touches(const Joined& joined,
                            std::span<btPersistentManifold* const> manifolds) const {
-  const auto is_own = [&](const btCollisionObject* object) {
-    return object->getUserIndex() >= 0 &&
-           joined_of_[static_cast<std::size_t>(object->getUserIndex())] == &joined;
-  };
   for (const btPersistentManifold* manifold : manifolds) {
-    if (!is_own(manifold->getBody0()) && !is_own(manifold->getBody1())) continue;
+    if (JoinedOf(*manifold->getBody0()) != &joined && JoinedOf(*manifold->getBody1()) != &joined) {
+      continue;
+    }
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
       if (manifold->getContactPoint(i).m_appliedImpulse > 0) return true;
     }

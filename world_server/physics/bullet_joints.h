@@ -39,7 +39,7 @@ class BulletJoints {
   struct Joined;
 
   void IgnorePairs(const Scene& scene);
-  bool IsJoined(const btRigidBody& rigid) const;
+  const Joined* JoinedOf(const btCollisionObject& object) const;  // null without a joint
   void AimFriction(std::span<btPersistentManifold* const> manifolds) const;
   void Read(const Joined& joined, std::span<BodyState> states) const;
   void WriteVelocities(const Joined& joined, std::span<const BodyState> states);

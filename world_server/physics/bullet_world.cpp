@@ -67,6 +67,7 @@ struct BulletWorld::Engine {
   Islands islands{bodies, pairs, sleepers, broadphase, world, parts.contacts};
 
   std::vector<char> pushed;          // of each moving body: in this window
+  std::vector<char> reached;         // ... or before, and it has not come to rest since
   std::vector<double> pushed_speed;  // m/s, that it may add
   std::vector<std::size_t> all_pushed;
   std::vector<FineStep> fine_steps;
@@ -81,6 +82,7 @@ struct BulletWorld::Engine {
         world(scene, dispatcher, broadphase, *solver, configuration, bodies, pairs, sleepers, parts,
               resting_depth),
         pushed(bodies.moving.size()),
+        reached(bodies.moving.size()),
         pushed_speed(bodies.moving.size()) {
     broadphase.m_deferedcollide = true;  // never asked for pairs: islands.h asks by itself
     broadphase.optimize();
@@ -139,9 +141,11 @@ void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
                                     double substep_s, bool long_substeps) {
   const GroupMotion motion = MotionOf(group, bodies, sleepers);
   const int sweeps = Sweeps(motion);
-  const bool is_pushed = std::any_of(group.members.begin(), group.members.end(),
-                                     [this](std::size_t body) { return pushed[body] != 0; });
-  if (!is_pushed && long_substeps) {
+  // What a push has set in motion goes on in the substeps of its local copy until it rests.
+  const bool is_reached =
+      std::any_of(group.members.begin(), group.members.end(),
+                  [this](std::size_t body) { return pushed[body] != 0 || reached[body] != 0; });
+  if (!is_reached && long_substeps) {
     if (window_s > 0) Step(group, window_s, CoarseSubstep(motion, substep_s, window_s), sweeps);
     return;
   }
@@ -152,6 +156,10 @@ void BulletWorld::Engine::StepGroup(const Group& group, std::size_t place,
       if (body != BulletBodies::kFixed && islands.GroupOf(body) == place) Apply(push);
     }
     if (step.length_s > 0) Step(group, step.length_s, longest_s, sweeps);
+  }
+  if (!is_reached) return;
+  for (const std::size_t body : group.members) {
+    reached[body] = bodies.moving[body].Speed() > kResting ? 1 : 0;
   }
 }
 
@@ -259,6 +267,7 @@ void BulletWorld::SetState(std::size_t body, const BodyState& state) {
   const std::size_t place = engine_->bodies.moving_of[body];
   engine_->sleepers.Wake(place);
   engine_->bodies.moving[place].SetState(state);
+  engine_->reached[place] = 1;  // for all that is known of it
   engine_->islands.UpdateBox(place);
   states_[body] = state;
 }

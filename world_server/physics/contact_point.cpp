@@ -27,4 +27,11 @@ void KeepSome(std::vector<ContactPoint>& points) {
   points = std::move(kept);
 }
 
+void PutInWorld(const Pose& pose_WF, std::vector<ContactPoint>& points) {
+  for (ContactPoint& point : points) {
+    point.point_W = pose_WF * point.point_W;
+    point.normal_W = pose_WF.orientation * point.normal_W;
+  }
+}
+
 }  // namespace rikiseki::world

@@ -20,4 +20,7 @@ inline constexpr std::size_t kMostContactPoints = 8;  // of one pair of shapes
 /// does not change, and the deepest where that is deeper than they are.
 void KeepSome(std::vector<ContactPoint>& points);
 
+/// Of points that were found in a frame of their own.
+void PutInWorld(const Pose& pose_WF, std::vector<ContactPoint>& points);
+
 }  // namespace rikiseki::world

@@ -208,21 +208,6 @@ class Pair {
 
 }  // namespace
 
-std::vector<ContactPoint> FindCylinderPlaneContact(const Cylinder& cylinder, const Pose& pose_WC,
-                                                   const Vec3& normal_W, double offset_m,
-                                                   double reach_m) {
-  std::vector<ContactPoint> points;
-  const PlacedCylinder placed(cylinder, pose_WC);
-  const double rounding = placed.RoundingAgainst(normal_W);
-  for (const Polygon& polygon : placed.Against(normal_W)) {
-    for (const Vec3& point : polygon) {
-      const double gap = normal_W.dot(point) - offset_m;
-      if (gap <= reach_m) points.push_back({point, normal_W, gap, rounding});
-    }
-  }
-  return points;
-}
-
 std::vector<ContactPoint> FindCylinderBoxContact(const Cylinder& cylinder, const Pose& pose_WC,
                                                  const Box& box, const Pose& pose_WB,
                                                  double reach_m) {

@@ -1,4 +1,4 @@
-// Where a cylinder touches or would touch a half-space or a box. On a flat face it stands on eight
+// Where a cylinder touches or would touch a box. On a flat face it stands on eight
 // points of its rim that are fixed in it, so that contacts persist while it slides; on its side it
 // lies on the two ends of a line; tilted, on the lowest point of its rim. Points with a gap belong to
 // it, so that a contact is known before it closes.
@@ -10,11 +10,6 @@
 #include "world_server/scene/scene.h"
 
 namespace rikiseki::world {
-
-/// Against the half-space normal . x <= offset (unit normal, W).
-std::vector<ContactPoint> FindCylinderPlaneContact(const Cylinder& cylinder, const Pose& pose_WC,
-                                                   const Vec3& normal_W, double offset_m,
-                                                   double reach_m);
 
 /// Those with a gap of at most `reach_m`; empty where the two pass each other. Separating axes: faces,
 /// edges against the side, edges against the rim.

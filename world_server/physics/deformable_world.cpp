@@ -78,9 +78,7 @@ void DeformableWorld::Soft::Advance(double period_s) {
 }
 
 std::unique_ptr<DynamicsWorld> MakeDynamics(const Scene& scene, double longest_substep_s) {
-  const bool deforms = std::any_of(scene.bodies.begin(), scene.bodies.end(),
-                                   [](const auto& body) { return body.softness.has_value(); });
-  if (deforms) return std::make_unique<DeformableWorld>(scene, longest_substep_s);
+  if (Deforms(scene)) return std::make_unique<DeformableWorld>(scene, longest_substep_s);
   return std::make_unique<BulletWorld>(scene, longest_substep_s);
 }
 

@@ -20,14 +20,15 @@ struct Kick {
   Vec3 angular_impulse = Vec3::Zero();  // N m s, about the body's centre of mass, in W
 };
 
-/// An impulse of which it is known where in the world it acts, but not yet where its body will be.
+/// An impulse of which it is known where in the world it acts, but not yet where its body will be: what the
+/// ledger owes a body, too.
 struct PlacedImpulse {
   std::size_t body = 0;
   Vec3 impulse = Vec3::Zero();          // N s, in W
   Vec3 angular_impulse = Vec3::Zero();  // N m s, about the world origin, in W
 };
 
-/// The push as a kick of a body whose centre of mass is there [m, in W].
+/// The push as a kick of a body whose centre of mass c is there [m, in W]: L_c = L - c x J.
 inline Kick KickOf(const PlacedImpulse& push, const Vec3& centre) {
   return {.body = push.body,
           .impulse = push.impulse,

@@ -161,6 +161,24 @@ void GroupedWorld::FindContacts(const Group& group, double step_s) {
   }
 }
 
+// The solver starts from the last substep's impulses, which were of forces that lasted as long as it did.
+// Never from more: what a blow gave is no load, and does not grow with the substep.
+void GroupedWorld::ScaleImpulses(double step_s) {
+  for (btPersistentManifold* manifold : manifolds_) {
+    const int first = manifold->getBody0()->getUserIndex();
+    const int place = first >= 0 ? first : manifold->getBody1()->getUserIndex();
+    const double last_step_s = bodies_.moving[static_cast<std::size_t>(place)].last_step_s;
+    if (last_step_s <= step_s) continue;
+    const double scale = step_s / last_step_s;
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+      btManifoldPoint& point = manifold->getContactPoint(i);
+      point.m_appliedImpulse *= scale;
+      point.m_appliedImpulseLateral1 *= scale;
+      point.m_appliedImpulseLateral2 *= scale;
+    }
+  }
+}
+
 void GroupedWorld::BlowAir(double step_s) {
   for (const std::size_t place : stepped_) {
     const MovingBody& body = bodies_.moving[place];
@@ -206,6 +224,7 @@ void GroupedWorld::Step(const Group& group, double step_s, int sweeps) {
   FindStepped(group);
   if (parts_.fast_bodies) SweepFastBodies(group, step_s);
   FindContacts(group, step_s);
+  ScaleImpulses(step_s);
   BeginSubstep(bodies_.moving, stepped_);
   if (parts_.drag) BlowAir(step_s);
   jointed_->BeginSubstep(manifolds_, stepped_, step_s);

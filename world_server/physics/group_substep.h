@@ -39,6 +39,7 @@ class GroupedWorld final : public btDiscreteDynamicsWorld {
   void SweepFastBodies(const Group& group, double step_s);
   void FindContacts(const Group& group, double step_s);
   bool WillTouch(const ContactPair& pair, double step_s) const;
+  void ScaleImpulses(double step_s);
   void BlowAir(double step_s);
   void Solve(const Group& group, double step_s);
 

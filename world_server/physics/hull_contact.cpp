@@ -185,10 +185,7 @@ std::vector<ContactPoint> FindHullBoxContact(const Polyhedron& hull, const Pose&
                                              const Box& box, const Pose& pose_WB, double reach_m) {
   const PlacedBox placed(box, pose_WH.Inverse() * pose_WB);
   std::vector<ContactPoint> points = Pair(hull, placed).Find(reach_m);
-  for (ContactPoint& point : points) {
-    point.point_W = pose_WH * point.point_W;
-    point.normal_W = pose_WH.orientation * point.normal_W;
-  }
+  PutInWorld(pose_WH, points);
   return points;
 }
 

@@ -75,10 +75,8 @@ void Islands::KnowJoints() {
 
 double Islands::SpeedOf(std::size_t body) const {
   const MovingBody& moving = bodies_.moving[body];
-  const double speed = moving.rigid->getLinearVelocity().length() +
-                       moving.outer_radius * moving.rigid->getAngularVelocity().length();
   const double wind = moving.air.acts() ? moving.air.wind.norm() : 0;
-  return speed + wind + window_s_ * moving.gravity + pushed_speed_[body];
+  return moving.Speed() + wind + window_s_ * moving.gravity + pushed_speed_[body];
 }
 
 std::size_t Islands::RootOf(std::size_t body) {

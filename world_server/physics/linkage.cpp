@@ -160,6 +160,19 @@ void Linkage::SetRow(const Link& link, const JointRow& row, Index place, MatrixX
   }
 }
 
+MatrixXd Linkage::OneRow(const Link& link, const JointRow& row) const {
+  MatrixXd jacobian = MatrixXd::Zero(1, At(bodies_.size()));
+  SetRow(link, row, 0, jacobian);
+  return jacobian;
+}
+
+// Whether the joint has a limit at which it does not stand yet.
+bool Linkage::MayStop(std::size_t link, std::span<const Stop> stops) const {
+  const Joint& joint = links_[link].joint;
+  return (std::isfinite(joint.lower) || std::isfinite(joint.upper)) &&
+         std::none_of(stops.begin(), stops.end(), [=](const Stop& s) { return s.link == link; });
+}
+
 // What the joints hold, then the stops.
 RowSystem Linkage::Rows(std::span<const BodyState> states, std::span<const Stop> stops) const {
   std::vector<JointRow> rows;
@@ -198,11 +211,8 @@ VectorXd Linkage::Errors(std::span<const BodyState> states, std::span<const Stop
 bool Linkage::AddPassed(std::span<const BodyState> states, std::vector<Stop>& stops) const {
   const std::size_t before = stops.size();
   for (std::size_t i = 0; i < links_.size(); ++i) {
+    if (!MayStop(i, stops)) continue;
     const Joint& joint = links_[i].joint;
-    if (!std::isfinite(joint.lower) && !std::isfinite(joint.upper)) continue;
-    if (std::any_of(stops.begin(), stops.end(), [i](const Stop& s) { return s.link == i; })) {
-      continue;
-    }
     const double position = Position(links_[i], states);
     if (position > joint.upper + kPassed) stops.push_back({.link = i, .upper = true});
     if (position < joint.lower - kPassed) stops.push_back({.link = i, .upper = false});
@@ -229,9 +239,7 @@ std::vector<JointRow> Linkage::HeldRows(std::size_t link) const {
 }
 
 double Linkage::Speed(std::size_t link) const {
-  MatrixXd row = MatrixXd::Zero(1, At(bodies_.size()));
-  SetRow(links_[link], free_rows_[link], 0, row);
-  return row.row(0).dot(Velocities(start_));
+  return OneRow(links_[link], free_rows_[link]).row(0).dot(Velocities(start_));
 }
 
 void Linkage::GiveLastImpulses(std::span<BodyState> states) const {
@@ -254,8 +262,7 @@ VectorXd Linkage::Resist(const VectorXd& before, const VectorXd& after, double s
   for (std::size_t i = 0; i < links_.size(); ++i) {
     const Joint& joint = links_[i].joint;
     if (!links_[i].has_axis() || !(joint.damping > 0 || joint.friction > 0)) continue;
-    MatrixXd row = MatrixXd::Zero(1, At(bodies_.size()));
-    SetRow(links_[i], free_rows_[i], 0, row);
+    const MatrixXd row = OneRow(links_[i], free_rows_[i]);
     VectorXd yield = Yields(row, inertias_, start_);
     yield -= held_.yields() * held_.Impulses(held_.jacobian() * yield);
     const double mobility = row.row(0).dot(yield);
@@ -327,18 +334,14 @@ VectorXd Linkage::Project(const RowSystem& held, std::span<BodyState> states) co
   const auto add_pushed = [&] {
     const std::size_t before = stops.size();
     for (std::size_t i = 0; i < links_.size(); ++i) {
+      if (!MayStop(i, stops)) continue;
       const Joint& joint = links_[i].joint;
-      if (!std::isfinite(joint.lower) && !std::isfinite(joint.upper)) continue;
-      if (std::any_of(stops.begin(), stops.end(), [i](const Stop& s) { return s.link == i; })) {
-        continue;
-      }
       const double position = Position(links_[i], states);
       const bool at_upper = position >= joint.upper - kAtLimit;
       const bool at_lower = position <= joint.lower + kAtLimit;
       if (!at_upper && !at_lower) continue;
-      MatrixXd row = MatrixXd::Zero(1, At(bodies_.size()));
-      SetRow(links_[i], FreeRow(joint.type, FramesOf(links_[i], states)), 0, row);
-      const double rate = row.row(0).dot(velocities);
+      const JointRow free = FreeRow(joint.type, FramesOf(links_[i], states));
+      const double rate = OneRow(links_[i], free).row(0).dot(velocities);
       if (at_upper && rate > 0) {
         stops.push_back({.link = i, .upper = true});
       } else if (at_lower && rate < 0) {
@@ -379,9 +382,7 @@ void Linkage::End(bool touches, double step_s, std::span<BodyState> states) {
   const auto along_axes = [&](std::span<const JointRow> rows, std::span<const BodyState> at) {
     MatrixXd row = MatrixXd::Zero(1, At(bodies_.size()));
     for (std::size_t i = 0; i < links_.size(); ++i) {
-      MatrixXd one = MatrixXd::Zero(1, At(bodies_.size()));
-      SetRow(links_[i], rows[i], 0, one);
-      row += resistance[static_cast<Index>(i)] * one;
+      row += resistance[static_cast<Index>(i)] * OneRow(links_[i], rows[i]);
     }
     return VectorXd(Yields(row, inertias_, at));
   };

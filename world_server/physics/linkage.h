@@ -101,6 +101,8 @@ class Linkage {
   double Position(const Link& link, std::span<const BodyState> states) const;
   void SetRow(const Link& link, const JointRow& row, Eigen::Index place,
               Eigen::MatrixXd& jacobian) const;
+  Eigen::MatrixXd OneRow(const Link& link, const JointRow& row) const;
+  bool MayStop(std::size_t link, std::span<const Stop> stops) const;
   RowSystem Rows(std::span<const BodyState> states, std::span<const Stop> stops) const;
   Eigen::VectorXd Errors(std::span<const BodyState> states, std::span<const Stop> stops) const;
   bool AddPassed(std::span<const BodyState> states, std::vector<Stop>& stops) const;

@@ -203,10 +203,7 @@ std::vector<ContactPoint> FindMeshContact(const Solid& first, const Pose& pose_W
   mesh.tree().VisitNear(pose_MF * ball.centre, ball.radius + reach_m,
                         [&](std::uint32_t face) { contact.Look(face); });
   std::vector<ContactPoint> points = contact.Take();
-  for (ContactPoint& point : points) {
-    point.point_W = pose_WM * point.point_W;
-    point.normal_W = pose_WM.orientation * point.normal_W;
-  }
+  PutInWorld(pose_WM, points);
   return points;
 }
 

@@ -6,16 +6,13 @@
 #include <ranges>
 #include <stdexcept>
 
+#include "common/overloaded.h"
+
 namespace rikiseki::world {
 namespace {
 
 constexpr double kAlongEdge = 1e-3;      // sine: raised by less, both ends of an edge touch
 constexpr std::size_t kManyFaces = 100;  // a hull of more is round enough to be found without
-
-template <typename... Functions>
-struct Overloaded : Functions... {
-  using Functions::operator()...;
-};
 
 Vec3 SupportOf(const PlacedLine& line, const Vec3& direction) {
   return direction.dot(line.to - line.from) > 0 ? line.to : line.from;

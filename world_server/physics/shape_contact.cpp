@@ -9,6 +9,7 @@
 #include "world_server/physics/cylinder_contact.h"
 #include "world_server/physics/hull_contact.h"
 #include "world_server/physics/mesh_contact.h"
+#include "world_server/physics/placed_convex.h"
 
 namespace rikiseki::world {
 namespace {
@@ -45,19 +46,17 @@ Points PlaneContact(const Solid& first, const Pose& pose_WF, const Vec3& normal_
   if (const auto* box = std::get_if<Box>(&first.shape)) {
     return FindBoxPlaneContact(*box, pose_WF, normal_W, offset_m, reach_m);
   }
-  if (const auto* cylinder = std::get_if<Cylinder>(&first.shape)) {
-    return FindCylinderPlaneContact(*cylinder, pose_WF, normal_W, offset_m, reach_m);
-  }
   if (first.faces) {
     return FindHullPlaneContact(*first.faces, pose_WF, normal_W, offset_m, reach_m);
   }
   const PlacedConvex placed(first, pose_WF);
+  const double rounding = placed.RoundingAgainst(normal_W);
   Points points;
   for (const Polygon& polygon : placed.Against(normal_W)) {
     for (const Vec3& of_core : polygon) {
       const Vec3 point = of_core - placed.radius() * normal_W;
       const double gap = normal_W.dot(point) - offset_m;
-      if (gap <= reach_m) points.push_back({point, normal_W, gap, placed.radius()});
+      if (gap <= reach_m) points.push_back({point, normal_W, gap, rounding});
     }
   }
   return points;

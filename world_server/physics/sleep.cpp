@@ -13,11 +13,6 @@ constexpr double kStays = 2.5e-5;    // m, so near is where it was
 constexpr double kSettling = 0.5;    // s, so long
 constexpr double kTrembling = 0.01;  // m/s, no faster meanwhile
 
-double SpeedOf(const MovingBody& body) {
-  return FromBullet(body.rigid->getLinearVelocity()).norm() +
-         body.outer_radius * FromBullet(body.rigid->getAngularVelocity()).norm();
-}
-
 }  // namespace
 
 Sleepers::Sleepers(std::vector<MovingBody>& moving, bool may_sleep)
@@ -56,7 +51,7 @@ void Sleepers::WatchOne(std::size_t body, double time_s) {
   Rest& rest = rests_[body];
   const double way = (position - rest.position).norm() +
                      moving_[body].outer_radius * orientation.angularDistance(rest.orientation);
-  if (way <= kStays && SpeedOf(moving_[body]) <= kTrembling) {
+  if (way <= kStays && moving_[body].Speed() <= kTrembling) {
     rest.time_s += time_s;
   } else {
     rest = {.position = position, .orientation = orientation};
@@ -107,7 +102,7 @@ void Sleepers::Watch(std::span<const std::size_t> members, std::span<ContactPair
     const bool held = held_[root] != 0;
     const bool rests = std::all_of(bodies.begin(), bodies.end(), [&](std::size_t body) {
       return rests_[body].time_s >= kSettling && pushed[body] == 0 &&
-             (held || SpeedOf(moving_[body]) == 0);
+             (held || moving_[body].Speed() == 0);
     });
     if (rests) PutToSleep(bodies);
   }

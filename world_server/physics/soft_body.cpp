@@ -119,15 +119,20 @@ void SoftBody::FindRotations() {
   }
 }
 
+// Adds scale times the forces on the nodes that balance a stress, in the element's turned frame.
+void SoftBody::AddForcesOf(const Element& element, double scale, const Mat3& stress,
+                           NodeVectors& sum) {
+  const Eigen::Matrix<double, 3, 4> forces =
+      (scale * element.volume) * (element.rotation * stress) * element.gradients;
+  for (int i = 0; i < 4; ++i) {
+    sum.col(element.nodes[static_cast<std::size_t>(i)]) += forces.col(i);
+  }
+}
+
 // Adds scale times the elastic forces on the nodes.
 void SoftBody::AddForces(double scale, NodeVectors& sum) const {
   for (const Element& element : elements_) {
-    const Eigen::Matrix<double, 3, 4> forces = (-scale * element.volume) *
-                                               (element.rotation * Stress(Strain(element))) *
-                                               element.gradients;
-    for (int i = 0; i < 4; ++i) {
-      sum.col(element.nodes[static_cast<std::size_t>(i)]) += forces.col(i);
-    }
+    AddForcesOf(element, -scale, Stress(Strain(element)), sum);
   }
 }
 
@@ -135,12 +140,7 @@ void SoftBody::AddForces(double scale, NodeVectors& sum) const {
 void SoftBody::AddStiffness(double scale, const NodeVectors& way, NodeVectors& sum) const {
   for (const Element& element : elements_) {
     const Mat3 local = element.rotation.transpose() * Gradient(element, way);
-    const Mat3 stress = Stress(0.5 * (local + local.transpose()));
-    const Eigen::Matrix<double, 3, 4> forces =
-        (scale * element.volume) * (element.rotation * stress) * element.gradients;
-    for (int i = 0; i < 4; ++i) {
-      sum.col(element.nodes[static_cast<std::size_t>(i)]) += forces.col(i);
-    }
+    AddForcesOf(element, scale, Stress(0.5 * (local + local.transpose())), sum);
   }
 }
 

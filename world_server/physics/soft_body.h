@@ -80,6 +80,8 @@ class SoftBody {
   Mat3 Gradient(const Element& element, const NodeVectors& vectors) const;
   Mat3 Strain(const Element& element) const;
   Mat3 Stress(const Mat3& strain) const;
+  static void AddForcesOf(const Element& element, double scale, const Mat3& stress,
+                          NodeVectors& sum);
   void AddForces(double scale, NodeVectors& sum) const;
   void AddStiffness(double scale, const NodeVectors& way, NodeVectors& sum) const;
   Eigen::SparseMatrix<double> Stiffness() const;

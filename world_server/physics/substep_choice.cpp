@@ -11,11 +11,10 @@ namespace {
 
 constexpr double kShortest = 1e-4;         // s: bounds what a scene can cost
 constexpr double kLongestTouching = 5e-3;  // s
-constexpr double kResting = 0.01;          // m/s: slower, and any substep will do
 constexpr double kMostTurn = 0.1;          // rad in a substep of free flight
 // ... while something is touched: the direction of slip is one and the same for a substep, and lags
-// half of what the body turns in it.
-constexpr double kMostTouchingTurn = 0.025;
+// half of what the body turns in it. A tenth of a degree.
+constexpr double kMostTouchingTurn = 0.004;
 constexpr double kMostDragging = 0.05;  // of the speed in a substep
 // A pair of 5 cm boxes, the lighter one below, stands at 2 ms up to this ratio, at 1 ms up to three
 // times it.
@@ -56,8 +55,7 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
     ++motion.awake;
     const double speed = body.rigid->getLinearVelocity().length();
     motion.turning = std::max(motion.turning, double{body.rigid->getAngularVelocity().length()});
-    motion.speed = std::max(motion.speed,
-                            speed + body.outer_radius * body.rigid->getAngularVelocity().length());
+    motion.speed = std::max(motion.speed, body.Speed());
     if (body.inner_radius > 0) {
       motion.crossing = std::max(motion.crossing, speed / body.inner_radius);
     }

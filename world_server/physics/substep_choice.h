@@ -8,6 +8,8 @@
 
 namespace rikiseki::world {
 
+inline constexpr double kResting = 0.01;  // m/s: of what is slower in contact, any substep will do
+
 /// What of a group bears on its substeps.
 struct GroupMotion {
   std::size_t awake = 0;

@@ -22,4 +22,9 @@ bool IsJointed(const Scene& scene, std::size_t body) {
   });
 }
 
+bool Deforms(const Scene& scene) {
+  return std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                     [](const SceneBody& body) { return body.softness.has_value(); });
+}
+
 }  // namespace rikiseki::world

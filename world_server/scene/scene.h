@@ -147,4 +147,7 @@ bool Collide(const Scene& scene, std::size_t a, std::size_t b);
 /// Whether a joint holds the body.
 bool IsJointed(const Scene& scene, std::size_t body);
 
+/// Whether some body is soft.
+bool Deforms(const Scene& scene);
+
 }  // namespace rikiseki::world

@@ -4,13 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "common/overloaded.h"
+
 namespace rikiseki::world {
 namespace {
-
-template <typename... Functions>
-struct Overloaded : Functions... {
-  using Functions::operator()...;
-};
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 

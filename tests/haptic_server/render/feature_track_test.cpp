@@ -292,7 +292,7 @@ TEST_CASE("a plane may bring a recovery time of its own, and rises within it") {
   }
 }
 
-TEST_CASE("a surface that vanishes while it is pressed fades where it was; others go at once") {
+TEST_CASE("a surface that vanishes while it is pressed fades where it was, and others go at once") {
   FeatureTrack track(DisplayRule::kInterpolate, kPeriodNs);
   protocol::Plane pressed = PlaneAt(1, Vec3(0.003, 0, 0), Vec3::UnitX());
   protocol::Plane slow = PlaneAt(2, Vec3(0.003, 0, 0), Vec3::UnitY());

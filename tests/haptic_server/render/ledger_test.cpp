@@ -179,7 +179,7 @@ TEST_CASE("a force against what is wanted, or more than it, is not the bodies' d
   REQUIRE(message.channels[0].impulse[0] == -4'000'000'000);
 }
 
-TEST_CASE("acks cover what was displayed up to their tick; totals may come in any portions") {
+TEST_CASE("acks cover what was displayed up to their tick, and totals may come in any portions") {
   Ledger ledger(kPeriodNs, 4096, 77);
   std::vector<ImpulseUnits> displayed;
   for (std::uint64_t k = 0; k < 100; ++k) {

@@ -255,7 +255,8 @@ TEST_CASE("a body that the frame does not hold leaves when the frame is caught u
   CHECK(copies.Find(2, 1) == nullptr);
 }
 
-TEST_CASE("frames of other epochs count from now; of no tick we remember, they end the copies") {
+TEST_CASE(
+    "frames of other epochs count from now, and of no tick we remember, they end the copies") {
   LocalBodies copies(kPeriodNs, 64, 5, PositionRule::kSecondOrder);
   const Tick push{{{1, 1, Vec3(0.3, 0, 0), Vec3::Zero()}}};
   for (std::size_t k = 0; k < 1000; ++k) copies.Step(k, push.impulses, kPeriod);
@@ -297,7 +298,7 @@ TEST_CASE("an epoch of 0 accepts all") {
   CHECK(copies.Find(1, 1)->velocity.x() == Approx(1));
 }
 
-TEST_CASE("a tick of no length kicks and moves nothing; a very long one costs a bounded time") {
+TEST_CASE("a tick of no length kicks and moves nothing, and a very long one costs a bounded time") {
   LocalBodies copies(kPeriodNs, 64, 5, PositionRule::kSecondOrder);
   copies.Step(0, {}, kPeriod);
   protocol::WorldFrame frame = Frame(0);

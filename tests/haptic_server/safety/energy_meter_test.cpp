@@ -174,7 +174,7 @@ TEST_CASE("the cap hides growth, so that peaks that are cut count as grown") {
   CHECK(FlagsOfSplit(0.95, 500, 0.05, 5) == 0);  // never cut
 }
 
-TEST_CASE("a cycle may take some periods of a slow world; slower ones are a hand's") {
+TEST_CASE("a cycle may take some periods of a slow world, and slower ones are a hand's") {
   CHECK(FlagsOfSplit(1.05, 4000, 0.05, 1e9) == 0);
   CHECK(FlagsOfSplit(1.05, 4000, 1, 1e9) > 0);
 }
@@ -237,7 +237,8 @@ TEST_CASE("the controller lets a bare device rest on a wall that it could not be
   CHECK(wall.meter.times_flagged() == 0);
 }
 
-TEST_CASE("where nothing leaks, nothing is braked; a brake never exceeds what the device bears") {
+TEST_CASE(
+    "where nothing leaks, nothing is braked, and a brake never exceeds what the device bears") {
   Wall wall(BareDevice(), 2000);
   wall.Touch(-0.001, 1);
   CHECK(wall.meter.Brake().isZero(0));  // free

@@ -211,7 +211,7 @@ TEST_CASE("applied + discarded is what was displayed, exactly, under loss") {
           if (writer.Chance(0.4)) continue;  // lapped
           REQUIRE(reader.Consume(message));
           if (!writer.Chance(0.05)) continue;
-          for (const PendingImpulse& owed : reader.Take()) {
+          for (const PlacedImpulse& owed : reader.Take()) {
             REQUIRE(owed.body < 2);
             REQUIRE(owed.impulse.norm() <= cap);
           }
@@ -389,7 +389,7 @@ TEST_CASE("random bytes do no harm") {
     }
     reader.Consume(message);
     if (round % 5 != 0) continue;
-    for (const PendingImpulse& owed : reader.Take()) {
+    for (const PlacedImpulse& owed : reader.Take()) {
       REQUIRE(owed.impulse.norm() <= 2.0);
       REQUIRE(owed.angular_impulse.norm() <= 20.0);
     }
@@ -428,7 +428,7 @@ TEST_CASE("message by message is the same in all as what is handed out at once")
     std::array<Vec3, 3> angular;
     impulse.fill(Vec3::Zero());
     angular.fill(Vec3::Zero());
-    for (const PendingImpulse& owed : reader.Take()) {
+    for (const PlacedImpulse& owed : reader.Take()) {
       impulse[owed.body] = owed.impulse;
       angular[owed.body] = owed.angular_impulse;
     }
@@ -478,7 +478,7 @@ TEST_CASE("the first moment of a lost block is counted from what was known befor
   CHECK(reader.replay().impulses[0].first_moment.x() == Approx(0.003));
 }
 
-TEST_CASE("only `local` keeps messages apart; what goes with a scene is not replayed") {
+TEST_CASE("only `local` keeps messages apart, and what goes with a scene is not replayed") {
   for (const Coupling coupling : {Coupling::kPosition, Coupling::kImpulse}) {
     LedgerReader reader = MakeReader(coupling);
     reader.Consume(Message(1, {On(0, 0)}));

@@ -142,7 +142,7 @@ TEST_CASE("substeps as long as a tick only where the finger pushed") {
 }
 
 TEST_CASE(
-    "what the ticks do not cover passes before them; where they cover more they are shortened") {
+    "what the ticks do not cover passes before them, where they cover more they are shortened") {
   const std::vector<ReplayImpulse> push = {{.body = 0, .impulse = {1, 0, 0}}};
   for (const double covered : {0.02, 0.05, 0.08}) {
     Recorder world;

@@ -134,7 +134,7 @@ TEST_CASE("reach grows with speed, and a contact that one of two sees is not los
   CHECK(back.Contacts(1, 2) + back.Contacts(2, 1) == 4);
 }
 
-TEST_CASE("a chain of four has copies; of five none, unless the fifth is heavy") {
+TEST_CASE("a chain of four has copies, and of five none, unless the fifth is heavy") {
   const auto chain = [](int n, double last_kg) {
     std::vector<SceneBody> bodies;
     for (int i = 0; i < n; ++i) bodies.push_back(CubeAt(0.065 * i, i == n - 1 ? last_kg : 1));

@@ -133,7 +133,7 @@ TEST_CASE("what is jointed yields as its joint lets it") {
   CHECK(yields({0.7, 0.05, 1.6}) == Approx(0.49 / test::kDoorInertia).epsilon(1e-9));
 }
 
-TEST_CASE("every pointer and every collider has its own plane; the nearest 32 are sent") {
+TEST_CASE("every pointer and every collider has its own plane, and the nearest 32 are sent") {
   Scene scene;
   SceneBody body = test::Floor(1);
   body.colliders.clear();

@@ -387,7 +387,8 @@ TEST_CASE("a bridge on a hinge rests on a block, and the block bears half of it"
   CHECK((world.State(2).pose.position - rest).norm() < 1e-6);
 }
 
-TEST_CASE("jointed bodies and links of one model pass through each other; told to, links do not") {
+TEST_CASE(
+    "jointed bodies and links of one model pass through each other, and told to, links do not") {
   // Two cubes, one inside the other by half.
   Scene scene;
   scene.gravity.setZero();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "tests/world_server/physics/contact_trials.h"
+#include "world_server/physics/shape_contact.h"
 
 namespace rikiseki::world {
 namespace {
@@ -21,7 +22,8 @@ Quat About(const Vec3& axis, double angle) {
 
 // The same contact with a half-space and with the top of a table.
 std::vector<std::vector<ContactPoint>> OnBoth(const Pose& pose, double reach) {
-  return {FindCylinderPlaneContact(kCylinder, pose, Vec3::UnitZ(), 0.05, reach),
+  const Pose floor{{0, 0, 0.05}};
+  return {FindShapeContact(Solid(kCylinder), pose, Solid(HalfSpace{Vec3::UnitZ()}), floor, reach),
           FindCylinderBoxContact(kCylinder, pose, kTable, {}, reach)};
 }
 

@@ -89,7 +89,7 @@ TEST_CASE("it comes back when it is let go, and goes to sleep in its old shape")
   CHECK(std::abs(Dent(*world)) < 2e-6);
 }
 
-TEST_CASE("the same scene and the same kicks give the same bits; hostile ones do nothing") {
+TEST_CASE("the same scene and the same kicks give the same bits, and hostile ones do nothing") {
   const auto run = [](bool hostile) {
     const auto world = MakeDynamics(BlockAndCube(), 0.01);
     for (int i = 0; i < 30; ++i) {

@@ -103,7 +103,7 @@ TEST_CASE("a sleeper that is hit wakes before it is entered, and takes its share
   }
 }
 
-TEST_CASE("0.1 mm/s is a motion and no rest; so is anything that floats") {
+TEST_CASE("0.1 mm/s is a motion and no rest, and so is anything that floats") {
   Scene scene = CubesApart(2, 0);
   BulletWorld world(scene, 1e-3);
   Play(world, 1);

@@ -63,7 +63,7 @@ TEST_CASE("friction: two that could meet, both with some") {
                     })));
 }
 
-TEST_CASE("rotation: unequal moments of what can move; fast bodies: something to meet") {
+TEST_CASE("rotation needs unequal moments of what can move, fast bodies need something to meet") {
   CHECK_FALSE(Needs(protocol::kNeedRotation, CubeOnFloor(0.5)));
   CHECK(Needs(protocol::kNeedRotation,
               Changed(CubeOnFloor(0.5), [](Scene& s) { s.bodies[1].inertia(2, 2) *= 1.01; })));
@@ -71,7 +71,7 @@ TEST_CASE("rotation: unequal moments of what can move; fast bodies: something to
   CHECK_FALSE(Needs(protocol::kNeedFastBodies, FreeCube(1)));
 }
 
-TEST_CASE("drag: of the air on what can move; local bodies: of that coupling") {
+TEST_CASE("drag needs air and what can move, local bodies need that coupling") {
   CHECK_FALSE(Needs(protocol::kNeedDrag, CubeOnFloor(0.5)));
   CHECK(Needs(protocol::kNeedDrag,
               Changed(CubeOnFloor(0.5), [](Scene& s) { s.bodies[1].angular_drag_nms = 1; })));

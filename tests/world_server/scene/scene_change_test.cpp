@@ -23,7 +23,8 @@ void CheckOne(const BodyChange& change, std::size_t before, bool same, bool goes
 
 }  // namespace
 
-TEST_CASE("a scene that says the same changes nothing; started anew, what moves is another thing") {
+TEST_CASE(
+    "a scene that says the same changes nothing, and started anew, what moves is another thing") {
   const Scene scene = ThreeBodies();
   CHECK(scene == ThreeBodies());
   const auto changed = Changed(scene, scene);
@@ -57,7 +58,7 @@ TEST_CASE("bodies are known by their names, in whatever order they stand") {
 }
 
 TEST_CASE(
-    "whatever is described differently makes another thing; only another place ends the way") {
+    "whatever is described differently makes another thing, only another place ends the way") {
   const Scene before = ThreeBodies();
   const auto alter = [&](auto&& how) {
     Scene now = before;

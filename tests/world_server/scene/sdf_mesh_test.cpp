@@ -194,7 +194,7 @@ TEST_CASE("units, axes and parts of a DAE file") {
                  "it has no part called 'none'"));
 }
 
-TEST_CASE("a mesh inside out is turned; one that cannot be used is refused with its line") {
+TEST_CASE("a mesh inside out is turned, and one that cannot be used is refused with its line") {
   const Folder folder;
   std::string inverted = kCornerObj;
   inverted = inverted.substr(0, inverted.find("f 1"));

@@ -1,0 +1,11 @@
+// One function object of several lambdas: what std::visit chooses from.
+#pragma once
+
+namespace rikiseki {
+
+template <typename... Functions>
+struct Overloaded : Functions... {
+  using Functions::operator()...;
+};
+
+}  // namespace rikiseki
