@@ -131,6 +131,10 @@ ConfigSchema DeviceSchema(SpidarSettings& spidar, UsbSettings& usb) {
                 "Mass that moves with the grip.");
   schema.Number("spidar.friction_damping_ns_per_m", &spidar.friction_damping_ns_per_m, 0, 100,
                 "Viscous friction of motors and strings.");
+  schema.Number("spidar.friction_n", &spidar.friction_n, 0, 10,
+                "Dry friction of motors and strings, as felt at the grip.");
+  schema.Number("spidar.latency_us", &spidar.latency_us, 0, kLongestLatencyUs,
+                "From a measurement to the force that was computed from it.");
   return schema;
 }
 

@@ -85,6 +85,9 @@ struct HandSettings {
   int seed = 1;
 };
 
+/// Longer than this no device file may say that a force takes to come.
+inline constexpr double kLongestLatencyUs = 10'000;
+
 /// Motor positions and electronics of a 4-string SPIDAR. notes of config/devices/*.ini.
 struct SpidarSettings {
   std::vector<Vec3> motors_m;          // in device axes
@@ -94,6 +97,8 @@ struct SpidarSettings {
   double velocity_cutoff_hz = 100;  // of the first-order velocity filter
   double moving_mass_kg = 0.03;
   double friction_damping_ns_per_m = 0.2;
+  double friction_n = 0;  // Coulomb
+  double latency_us = 0;  // from a measurement to the force that was computed from it
 };
 
 struct Settings {

@@ -26,13 +26,33 @@ double OfString(const std::vector<double>& values, std::size_t string) {
   return values.size() == 1 ? values[0] : values[string];
 }
 
+haptic::MotorProgram::Script Waiting(const haptic::Settings& settings) {
+  haptic::MotorProgram::Script script;
+  script.home = ScriptOf(settings.hand).home;
+  return script;
+}
+
 }  // namespace
 
-EmulatedBoard::EmulatedBoard(const haptic::Settings& settings, int switch_id)
+EmulatedBoard::EmulatedBoard(const haptic::Settings& settings, int switch_id, Begins begins)
     : settings_(settings),
       switch_id_(switch_id),
-      board_(settings.spidar, MakeHand(settings)),
+      begins_(begins),
+      program_(begins == Begins::kByItself ? ScriptOf(settings.hand) : Waiting(settings)),
+      board_(settings.spidar,
+             {[this](double t_s) { return HandTarget(t_s); }, ImpedanceOf(settings)}),
       kinematics_(settings.spidar.motors_m) {}
+
+Vec3 EmulatedBoard::HandTarget(double t_s) {
+  if (is_requested_) {
+    is_requested_ = false;
+    auto once = ScriptOf(settings_.hand);
+    once.repeats = false;
+    program_ = haptic::MotorProgram(once);
+    begun_s_ = t_s;
+  }
+  return program_(t_s - begun_s_);
+}
 
 void EmulatedBoard::HoldInTheMiddle(int ticks, std::int64_t tick_ns) {
   held_until_ns_ = ticks * tick_ns;

@@ -28,8 +28,16 @@ struct BoardFaults {
 
 class EmulatedBoard {
  public:
+  /// When the hand goes through its script.
+  enum class Begins { kByItself, kOnRequest };
+
   /// Board, strings and hand of the settings; `switch_id` is where its rotary switch stands.
-  EmulatedBoard(const haptic::Settings& settings, int switch_id);
+  EmulatedBoard(const haptic::Settings& settings, int switch_id, Begins begins = Begins::kByItself);
+  EmulatedBoard(const EmulatedBoard&) = delete;
+  EmulatedBoard& operator=(const EmulatedBoard&) = delete;
+
+  /// The hand, which waited at home, goes through its script once, and waits again.
+  void Begin() { is_requested_ = true; }
 
   /// The hand stays in the middle for so many ticks of `tick_ns`, is then carried to its home in as
   /// many, and only then begins its script.
@@ -70,9 +78,14 @@ class EmulatedBoard {
                                                      std::int64_t now_ns);
   void Command(std::span<const std::uint8_t> words);
   void Advance(std::int64_t now_ns);
+  Vec3 HandTarget(double t_s);
 
   haptic::Settings settings_;
   int switch_id_;
+  Begins begins_;
+  haptic::MotorProgram program_;
+  double begun_s_ = 0;
+  bool is_requested_ = false;
   haptic::SimulatedBoard board_;
   haptic::SpidarKinematics kinematics_;
   std::int64_t held_until_ns_ = 0;

@@ -36,7 +36,7 @@ std::vector<std::string> EmulatorCommand(const std::string& device_file,
   for (const std::string& setting : UsbSettingsOf(device_file)) {
     command.insert(command.end(), {"--set", setting});
   }
-  for (const std::string& setting : more) command.insert(command.end(), {"--set", setting});
+  command.insert(command.end(), more.begin(), more.end());
   return command;
 }
 
@@ -45,9 +45,7 @@ std::vector<std::string> EmulatorCommand(const std::string& device_file,
 std::vector<std::string> UsbSettingsOf(const std::string& device_file) {
   return {"device.file=" + SourceFile("config/devices/" + device_file),
           "loop.rate_hz=" + std::to_string(kUsbRateHz), "usb.reply_within_us=3500",
-          "safety.slew_limit_n_per_s=5000",
-          // Time to put the block back between two pushes.
-          "hand.rest_ms=700"};
+          "safety.slew_limit_n_per_s=5000"};
 }
 
 EmulatedBus::EmulatedBus(const std::string& device_file, const std::vector<std::string>& more)

@@ -14,7 +14,7 @@ inline constexpr int kUsbRateHz = 250;
 
 class EmulatedBus {
  public:
-  /// Nothing is plugged in yet. `device_file` of config/devices; `more` settings of the emulated hand.
+  /// Nothing is plugged in yet. `device_file` of config/devices; `more` arguments of usb_emulator.
   /// Throws std::runtime_error.
   explicit EmulatedBus(const std::string& device_file, const std::vector<std::string>& more = {});
   ~EmulatedBus();

@@ -1,7 +1,7 @@
 // usb_emulator: a Cyverse board with strings and a hand behind it, for the whole, unmodified daemon:
 //
 //   umockdev-wrapper usb_emulator --config haptic_server.ini --control SOCKET
-//       [--set device.file=... ] [--switch N] [--tick-us US]
+//       [--set device.file=... ] [--switch N] [--tick-us US] [--on-request]
 //   UMOCKDEV_DIR=<what `root` answers> umockdev-wrapper haptic_server --device usb ...
 //
 // It listens on a socket for one command a line, and answers each with one line (Commands below). The
@@ -45,6 +45,7 @@ struct Options {
   std::string control;
   int switch_id = 5;
   int tick_us = 1000;
+  bool on_request = false;
 };
 
 // A board on the bus: firmware, hand and the clock of the hand. Guarded by `mutex`.
@@ -55,7 +56,9 @@ class BoardOnBus {
       : tick_ns_(options.tick_us * 1'000LL),
         // An Sh4 is read with every packet, twice a tick: half a tick each.
         step_ns_(settings.usb.board == haptic::UsbBoardModel::kSh4 ? tick_ns_ / 2 : tick_ns_),
-        board_(settings, options.switch_id),
+        board_(settings, options.switch_id,
+               options.on_request ? EmulatedBoard::Begins::kOnRequest
+                                  : EmulatedBoard::Begins::kByItself),
         bus_(testbed, mutex,
              {.vendor = 0x0CEC,
               .product = static_cast<std::uint16_t>(
@@ -139,6 +142,7 @@ class Emulator {
         {"plug_blank", [&] { blank_.Plug(); }},
         {"unplug_blank", [&] { blank_.Unplug(); }}};
     const std::map<std::string, std::function<void()>> locked = {
+        {"begin", [&] { board.Begin(); }},
         {"forget", [&] { board.ForgetCounters(); }},  // the power was away as well
         {"stall_in", [&] { bus.faults.stall_in = true; }},
         {"stall_out", [&] { bus.faults.stall_out = true; }},
@@ -234,7 +238,8 @@ int Run(int argc, char** argv) {
       "set", po::value(&options.set)->composing(), "likewise")(
       "control", po::value(&options.control)->required(), "socket for commands")(
       "switch", po::value(&options.switch_id), "where the rotary switch stands")(
-      "tick-us", po::value(&options.tick_us), "that the hand moves on by a tick");
+      "tick-us", po::value(&options.tick_us), "that the hand moves on by a tick")(
+      "on-request", po::bool_switch(&options.on_request), "the hand waits for `begin`");
   ParseCommandLine(argc, argv, line);
   options.set.emplace_back("device.kind=usb");
   const haptic::Settings settings = haptic::LoadSettings(options.config, options.set);

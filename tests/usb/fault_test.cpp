@@ -91,7 +91,7 @@ int Cycles() {
 
 TEST_CASE("unplugged and plugged in again, over and over, with counters kept or lost") {
   const char* file = GENERATE("spidar4_simple.ini", "spidar4_sh4.ini");
-  EmulatedBus bus(file, {"hand.script=rest"});
+  EmulatedBus bus(file, {"--set", "hand.script=rest"});
   bus.Tell("plug");
   // The hand rests, 50 mm from the middle: a board that forgot its counters under a hand that moves before it is
   // read again cannot be told from one that kept them.

@@ -128,6 +128,7 @@ void UsbFs::Ioctl(UMockdevIoctlClient* client) {
       return complete(0, 0);
     case USBDEVFS_CLEAR_HALT: {
       UMockdevIoctlData* data = umockdev_ioctl_data_resolve(argument, 0, sizeof(unsigned), nullptr);
+      if (data == nullptr) return complete(-1, EFAULT);
       unsigned endpoint = 0;
       std::memcpy(&endpoint, data->data, sizeof endpoint);
       ((endpoint & 0x80) != 0 ? faults.stall_in : faults.stall_out) = false;
@@ -155,6 +156,8 @@ void UsbFs::Ioctl(UMockdevIoctlClient* client) {
 
 void UsbFs::Submit(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
   UMockdevIoctlData* data = umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr);
+  // A host that is killed in the middle of a call takes its memory along.
+  if (data == nullptr) return umockdev_ioctl_client_complete(client, -1, EFAULT);
   const auto* raw = reinterpret_cast<const usbdevfs_urb*>(data->data);
   UMockdevIoctlData* buffer =
       raw->buffer_length > 0

@@ -10,11 +10,13 @@ namespace rikiseki::haptic {
 
 std::unique_ptr<Device> OpenDevice(const Settings& settings) {
   if (settings.device.kind == DeviceKind::kSimulated) return MakeDevice(settings);
+  return std::make_unique<Spidar>(settings.spidar, OpenUsbBoard(settings));
+}
+
+std::unique_ptr<MotorBoard> OpenUsbBoard(const Settings& settings) {
   const double rest_n = settings.spidar.tension_min_n;
-  return std::make_unique<Spidar>(
-      settings.spidar,
-      std::make_unique<UsbBoard>(settings.usb, rest_n,
-                                 std::make_unique<LibusbPort>(settings.usb, rest_n)));
+  return std::make_unique<UsbBoard>(settings.usb, rest_n,
+                                    std::make_unique<LibusbPort>(settings.usb, rest_n));
 }
 
 std::string DescribeBoard(const Settings& settings) {

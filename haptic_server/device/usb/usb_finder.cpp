@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <optional>
 #include <utility>
 
 #include "common/clock.h"
@@ -72,9 +73,9 @@ bool HasBulkEndpoint(const libusb_interface_descriptor& interface, std::uint8_t 
 }
 
 // Numbers of interface and setting stand nowhere; the two endpoints tell them.
-void ClaimPipes(libusb_device* device, OpenBoard& board) {
+void ClaimPipes(OpenBoard& board) {
   libusb_config_descriptor* raw = nullptr;
-  libusb_get_active_config_descriptor(device, &raw);
+  libusb_get_active_config_descriptor(libusb_get_device(board.handle.get()), &raw);
   const std::unique_ptr<libusb_config_descriptor, decltype(&libusb_free_config_descriptor)> config(
       raw, libusb_free_config_descriptor);
   for (int i = 0; config != nullptr && i < config->bNumInterfaces; ++i) {
@@ -162,13 +163,27 @@ void Drain(OpenBoard& board) {
   }
 }
 
-OpenBoard Open(const UsbSettings& usb, LibusbContext context, libusb_device* device,
-               const libusb_device_descriptor& description) {
+// Opens in a context of its own, which later only the tick's thread uses, the device that another
+// context has as `found`. None if it is gone.
+std::optional<OpenBoard> Open(const UsbSettings& usb, libusb_device* found,
+                              const libusb_device_descriptor& description) {
   OpenBoard board;
-  board.place = PlaceOf(device);
-  board.context = std::move(context);
-  libusb_device_handle* handle = nullptr;
-  const int error = libusb_open(device, &handle);
+  board.context = NewContext();
+  board.place = PlaceOf(found);
+  int error = 0;
+  {
+    // No device may outlive its context, so this list must not see the end of the board's.
+    const DeviceList list(board.context.get());
+    const auto end = list.devices + std::max<ssize_t>(list.count, 0);
+    const auto same = std::find_if(list.devices, end, [&](libusb_device* device) {
+      return libusb_get_bus_number(device) == libusb_get_bus_number(found) &&
+             libusb_get_device_address(device) == libusb_get_device_address(found);
+    });
+    if (same == end) return std::nullopt;
+    libusb_device_handle* handle = nullptr;
+    error = libusb_open(*same, &handle);
+    board.handle.reset(handle);
+  }
   if (error == LIBUSB_ERROR_ACCESS) {
     throw UsbError(UsbTrouble::kPermission,
                    "permission denied for the board " + BoardName(usb.board) + " at " +
@@ -181,8 +196,7 @@ OpenBoard Open(const UsbSettings& usb, LibusbContext context, libusb_device* dev
         error == LIBUSB_ERROR_NO_DEVICE ? UsbTrouble::kUnplugged : UsbTrouble::kTransferFailed,
         "the board at " + board.place + " cannot be opened: " + libusb_error_name(error));
   }
-  board.handle.reset(handle);
-  board.serial = SerialOf(handle, description);
+  board.serial = SerialOf(board.handle.get(), description);
   return board;
 }
 
@@ -222,22 +236,15 @@ OpenBoard FindBoard(const UsbSettings& usb) {
     if (description.idVendor != kVendorId || description.idProduct != ProductOf(usb.board)) {
       continue;
     }
-    // Opened in a context of its own, which later only the tick's thread uses.
-    LibusbContext context = NewContext();
-    const DeviceList again(context.get());
-    const auto end = again.devices + std::max<ssize_t>(again.count, 0);
-    const auto same = std::find_if(again.devices, end, [&](libusb_device* device) {
-      return libusb_get_bus_number(device) == libusb_get_bus_number(list.devices[i]) &&
-             libusb_get_device_address(device) == libusb_get_device_address(list.devices[i]);
-    });
-    if (same == end) continue;
-    OpenBoard board = Open(usb, std::move(context), *same, description);
+    std::optional<OpenBoard> opened = Open(usb, list.devices[i], description);
+    if (!opened) continue;
+    OpenBoard& board = *opened;
     if (usb.serial != kAnySerial && usb.serial != board.serial) {
       others += " (" + board.place + " has serial number " +
                 (board.serial.empty() ? "none" : board.serial) + ")";
       continue;
     }
-    ClaimPipes(*same, board);
+    ClaimPipes(board);
     Identify(usb, board);
     if (usb.switch_id != kAnySwitch && usb.switch_id != board.switch_id) {
       others += " (" + board.place + " has its switch at " + std::to_string(board.switch_id) + ")";
