@@ -11,15 +11,11 @@
 #include <numeric>
 #include <sstream>
 
+#include "common/text.h"
+
 namespace rikiseki {
 namespace po = boost::program_options;
 namespace {
-
-std::string Trim(const std::string& text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
 
 std::string Show(double value) {
   std::array<char, 32> text{};

@@ -2,8 +2,10 @@
 #include <sched.h>
 #include <spdlog/spdlog.h>
 
+#include <array>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 #include "common/clock.h"
 #include "common/daemon.h"
@@ -11,6 +13,7 @@
 #include "common/realtime.h"
 #include "common/version.h"
 #include "haptic_server/device/usb/usb_device.h"
+#include "haptic_server/guided/guided_run.h"
 #include "haptic_server/keyboard.h"
 #include "haptic_server/loop.h"
 #include "haptic_server/safety/stability.h"
@@ -72,6 +75,20 @@ bool IsRendering(protocol::ForceReason reason) {
   return reason <= protocol::ForceReason::kSoftStart || reason == protocol::ForceReason::kPassivity;
 }
 
+std::optional<Procedure> ProcedureOf(const DaemonOptions& options) {
+  std::optional<Procedure> chosen;
+  constexpr std::array kProcedures = {Procedure::kCalibrate, Procedure::kIdentify,
+                                      Procedure::kZWidth};
+  for (std::size_t i = 0; i < kProcedures.size(); ++i) {
+    if (options.extra[1 + i].empty()) continue;
+    if (chosen) {
+      throw StartError(kExitUsage, "of --calibrate, --identify and --z-width, one at a time");
+    }
+    chosen = kProcedures[i];
+  }
+  return chosen;
+}
+
 // Logs what changed, for the tick may not; ends on SIGINT or SIGTERM.
 void Supervise(const Settings& settings, const Device& device, const HapticLoop& loop,
                protocol::PeerLink& link) {
@@ -108,10 +125,15 @@ void Supervise(const Settings& settings, const Device& device, const HapticLoop&
 
 int Run(int argc, char** argv) {
   CatchOperatorSignals();
-  const DaemonOptions options =
-      ParseDaemonOptions(argc, argv, "haptic_server", kPurpose,
-                         {{"device", "simulated|usb", "wins over device.kind"}});
+  const DaemonOptions options = ParseDaemonOptions(
+      argc, argv, "haptic_server", kPurpose,
+      {{"device", "simulated|usb", "wins over device.kind"},
+       {"calibrate", "", "finds out where the motors are, and saves it"},
+       {"identify", "",
+        "finds out mass, damping, friction and latency of the device, and saves them"},
+       {"z-width", "", "finds out how stiff a wall the device bears"}});
   std::vector<std::string> overrides = options.set;
+  const std::optional<Procedure> procedure = ProcedureOf(options);
   if (!options.extra[0].empty()) overrides.push_back("device.kind=" + options.extra[0]);
   std::string description;
   const Settings settings = LoadSettings(options.config, overrides, &description);
@@ -123,9 +145,12 @@ int Run(int argc, char** argv) {
     std::fputs(description.c_str(), stdout);
     const std::string board = DescribeBoard(settings);
     if (!board.empty()) std::printf("# device: %s\n", board.c_str());
+    const std::string stability = LargestStiffnessInWords(settings);
+    if (!stability.empty()) std::printf("# stability: %s\n", stability.c_str());
     return kExitOk;
   }
   BlockSignals();
+  if (procedure) return RunGuided(*procedure, settings, panel);
   const std::unique_ptr<Device> device = OpenDevice(settings);
   const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
   protocol::SegmentOwner owner(

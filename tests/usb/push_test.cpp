@@ -20,11 +20,11 @@ using namespace rikiseki::test;  // NOLINT(google-build-using-namespace)
 using protocol::PeerState;
 using protocol::Role;
 
-constexpr double kSlewLimit = 5000;   // N/s, as set
-constexpr double kAtHome = -0.045;    // m: the hand has come back
-constexpr double kLongestPushS = 20;  // on a machine that others use
+constexpr double kSlewLimit = 5000;       // N/s, as set
+constexpr double kAtHome = -0.045;        // m: the hand has come back
+constexpr double kLongestPushS = 20;      // on a machine that others use
 constexpr std::uint64_t kMostMissed = 2;  // deadlines, of the 400 or so of a push
-constexpr int kEnough = 3;               // pushes, for a mean and its error
+constexpr int kEnough = 3;                // pushes, for a mean and its error
 
 int Pushes() {
   return std::getenv("RIKISEKI_FULL") != nullptr ? 20 : 5;
