@@ -38,6 +38,13 @@ ensure_packages() {
   rm -f "$log"
 }
 
+# ensure_npm: Node and npm, which bundle the viewer's page, from wherever they are. False where they cannot be had:
+# the build then leaves the viewer out.
+ensure_npm() {
+  command -v node >/dev/null && command -v npm >/dev/null && return
+  (ensure_packages nodejs npm) || { say "the viewer is left out: no npm"; return 1; }
+}
+
 # build PRESET [TARGET...]: configures and builds into build/PRESET; quiet unless it fails.
 build() {
   local preset=$1 log
