@@ -84,10 +84,11 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Number("mapping.force_scale", &mapping.force_scale, 1e-3, 1e3,
                 "Newtons at the device per newton in the world.");
 
-  schema.Choice("device.kind", &settings.device.kind, {{"simulated", DeviceKind::kSimulated}},
+  schema.Choice("device.kind", &settings.device.kind,
+                {{"simulated", DeviceKind::kSimulated}, {"replay", DeviceKind::kReplay}},
                 "Which force display to drive.");
   schema.Path("device.file", &settings.device.file,
-              "The file that describes the display, relative to this one.");
+              "The file that describes the display, or that is replayed, relative to this one.");
 
   HandSettings& hand = settings.hand;
   schema.Choice(
@@ -190,7 +191,7 @@ std::int64_t Settings::period_ns() const {
 }
 
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description) {
+                      std::string* description, ConfigValues* values) {
   const std::string device_prefix = "spidar.";
   Settings settings;
   ConfigSchema daemon = DaemonSchema(settings);
@@ -200,17 +201,22 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
   }
   if (settings.device.file.empty()) daemon.Refuse("device.file", "the display needs a description");
 
+  const bool described = settings.device.kind != DeviceKind::kReplay;
   ConfigSchema device = DeviceSchema(settings.spidar);
-  device.Load(settings.device.file);
+  if (described) device.Load(settings.device.file);
   for (const std::string& assignment : set) {
     if (assignment.starts_with(device_prefix)) device.Set(assignment);
   }
 
   if (const auto conflict = FindConflict(settings)) daemon.Refuse(conflict->key, conflict->why);
-  if (const auto conflict = FindConflict(settings.spidar)) {
+  if (const auto conflict = FindConflict(settings.spidar); described && conflict) {
     device.Refuse(conflict->key, conflict->why);
   }
   if (description != nullptr) *description = daemon.Describe() + device.Describe();
+  if (values != nullptr) {
+    *values = daemon.Values();
+    values->merge(device.Values());
+  }
   return settings;
 }
 
