@@ -40,12 +40,9 @@ Json Durations(const Histogram& histogram) {
     if (histogram[i] == 0) continue;
     buckets.push_back({static_cast<double>(HistogramLowerEdge(i)) * 1e-3, histogram[i]});
   }
-  return {{"count", HistogramTotal(histogram)},
-          {"buckets", std::move(buckets)},
-          {"p50", microseconds(0.5)},
-          {"p99", microseconds(0.99)},
-          {"p99_9", microseconds(0.999)},
-          {"max", microseconds(1)}};
+  return {{"count", HistogramTotal(histogram)}, {"buckets", std::move(buckets)},
+          {"p50", microseconds(0.5)},           {"p99", microseconds(0.99)},
+          {"p99_9", microseconds(0.999)},       {"max", microseconds(1)}};
 }
 
 Json Scheduled(const Scheduling& scheduling) {

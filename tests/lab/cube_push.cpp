@@ -4,16 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <stdexcept>
+#include <utility>
 
-#include "tests/lab/coupled_run.h"
 #include "tests/lab/prescribed_device.h"
 #include "world_server/physics/bullet_world.h"
 
 namespace rikiseki::lab {
 namespace {
 
-constexpr double kHapticPeriod = 1e-3;     // s
 constexpr double kSettling = 0.5;          // s, of the world alone, before anything else
 constexpr double kForceFrom = 0.2;         // s: mean and SD of the force begin here
 constexpr double kUnlimited = 1e9;         // for limits that must not act: N, N/s, m/s, mm
@@ -23,14 +21,14 @@ constexpr double kRunawayDistance = 1000;  // m: nothing on a lab's floor, but a
 haptic::Settings HapticSettings(const CubePush& push, const PushLoops& loops,
                                 double world_period_s) {
   haptic::Settings settings;
-  settings.loop.rate_hz = 1 / kHapticPeriod;
+  settings.loop.rate_hz = 1 / loops.haptic_period_s;
   settings.loop.longest_world_period_ms =
       std::max(settings.loop.longest_world_period_ms,
-               1e3 * (world_period_s + loops.latency_ticks * kHapticPeriod));
+               1e3 * (world_period_s + loops.latency_ticks * loops.haptic_period_s));
   settings.render.stiffness_n_per_m = push.stiffness_n_per_m;
   settings.render.damping_ns_per_m = push.damping_ns_per_m;
-  settings.render.display =
-      loops.coupling ? haptic::DisplayRule::kInterpolate : haptic::DisplayRule::kHold;
+  settings.render.display = loops.coupling ? loops.display : haptic::DisplayRule::kHold;
+  settings.render.position_rule = loops.position_rule;
   settings.render.finger_radius_mm = kFingerRadius * 1e3;
   settings.safety.force_cap_n = kUnlimited;
   settings.safety.slew_limit_n_per_s = kUnlimited * 1e6;  // the whole cap in a microsecond
@@ -45,6 +43,7 @@ world::Settings WorldSettings(const PushLoops& loops, double world_period_s) {
   settings.coupling.coupling = loops.coupling.value_or(protocol::Coupling::kImpulse);
   settings.coupling.force_cap_n = kUnlimited;
   settings.features.radius_mm = kUnlimited;
+  settings.physics.substep_ms = loops.substep_s * 1e3;
   return settings;
 }
 
@@ -77,34 +76,43 @@ double Yaw(const protocol::Body& body) {
 
 }  // namespace
 
-PushResult SimulateCubePush(const CubePush& push, const PushLoops& loops) {
-  const double world_period_s = loops.coupling ? loops.world_period_s : kHapticPeriod;
+PreparedRun PrepareCubePush(const CubePush& push, const PushLoops& loops) {
+  const double world_period_s = loops.coupling ? loops.world_period_s : loops.haptic_period_s;
   const haptic::Settings haptic_settings = HapticSettings(push, loops, world_period_s);
   const world::Settings world_settings = WorldSettings(loops, world_period_s);
   const world::Scene scene = PushScene(push);
-  auto dynamics =
-      std::make_unique<world::BulletWorld>(scene, world_settings.physics.substep_ms * 1e-3);
+  auto dynamics = std::make_unique<world::BulletWorld>(scene, loops.substep_s);
   dynamics->ApplyAndStep({}, kSettling);
   const Vec3 start = dynamics->State(0).pose.position;
 
   // The loops have run for a while when the finger starts: for a whole world period, so that every
   // world tick of the script consumes one, and until frames arrive.
   const auto lead_ticks =
-      std::llround(std::ceil(world_period_s / kHapticPeriod - 1e-9)) + loops.latency_ticks;
-  PrescribedDevice finger(
-      [&](double t_s) { return FingerPosition(push, start, t_s); },
-      CoupledRun::StartNs(haptic_settings) + lead_ticks * haptic_settings.period_ns());
-  CoupledRun run(haptic_settings, finger, world_settings, scene, std::move(dynamics),
-                 loops.phase_ticks, loops.latency_ticks);
-  for (long long k = 0; k < lead_ticks; ++k) run.Tick();
+      std::llround(std::ceil(world_period_s / loops.haptic_period_s - 1e-9)) + loops.latency_ticks;
+  PreparedRun prepared{
+      .device = std::make_unique<PrescribedDevice>(
+          [push, start](double t_s) { return FingerPosition(push, start, t_s); },
+          CoupledRun::StartNs(haptic_settings) + lead_ticks * haptic_settings.period_ns()),
+      .loops = nullptr,
+      .duration_s = Duration(push)};
+  prepared.loops =
+      std::make_unique<CoupledRun>(haptic_settings, *prepared.device, world_settings, scene,
+                                   std::move(dynamics), loops.phase_ticks, loops.latency_ticks);
+  for (long long k = 0; k < lead_ticks; ++k) prepared.loops->Tick();
+  return prepared;
+}
 
+PushResult SimulateCubePush(const CubePush& push, const PushLoops& loops) {
+  const PreparedRun prepared = PrepareCubePush(push, loops);
+  CoupledRun& run = *prepared.loops;
+  const double start_x = run.world().Bodies()[0].position[0];
   ForceStatistics force;
-  const long long ticks = std::llround(Duration(push) / kHapticPeriod);
+  const long long ticks = std::llround(prepared.duration_s / loops.haptic_period_s);
   const auto tick = [&](long long k) {
     const bool world_ticked = run.Tick();
     if (k < ticks) {
       force.Add(ToVec3(run.haptic_tick().pointers[0].force).norm(),
-                static_cast<double>(k) * kHapticPeriod);
+                static_cast<double>(k) * loops.haptic_period_s);
     }
     return world_ticked;
   };
@@ -113,7 +121,7 @@ PushResult SimulateCubePush(const CubePush& push, const PushLoops& loops) {
   }
 
   const protocol::Body& cube = run.world().Bodies()[0];
-  PushResult result{.displacement_m = cube.position[0] - start.x(),
+  PushResult result{.displacement_m = cube.position[0] - start_x,
                     .yaw_rad = Yaw(cube),
                     .force_mean_n = force.mean(),
                     .force_sd_n = force.sd(),
@@ -125,7 +133,7 @@ PushResult SimulateCubePush(const CubePush& push, const PushLoops& loops) {
 }
 
 PushStatistics SimulateCubePushes(const CubePush& push, PushLoops loops, int phases) {
-  const double ticks_per_period = std::round(loops.world_period_s / kHapticPeriod);
+  const double ticks_per_period = std::round(loops.world_period_s / loops.haptic_period_s);
   const int runs = loops.coupling ? phases : 1;
   PushStatistics sum;
   sum.displacement_min_m = std::numeric_limits<double>::infinity();

@@ -5,7 +5,9 @@
 
 #include <optional>
 
+#include "haptic_server/settings.h"
 #include "protocol/messages.h"
+#include "tests/lab/prepared_run.h"
 #include "tests/lab/push_script.h"
 
 namespace rikiseki::lab {
@@ -17,6 +19,10 @@ struct PushLoops {
   double world_period_s = 0.05;
   int latency_ticks = 0;  // of a frame, in haptic ticks
   int phase_ticks = 0;    // of the world's ticks against the script's start
+  double haptic_period_s = 1e-3;
+  haptic::DisplayRule display = haptic::DisplayRule::kInterpolate;  // a single rate: kHold, always
+  PositionRule position_rule = PositionRule::kSecondOrder;          // of the local copies
+  double substep_s = 1e-3;                                          // of the engine
 };
 
 /// One push at one sampling phase.
@@ -30,7 +36,11 @@ struct PushResult {
   bool diverged = false;
 };
 
-/// Haptics at 1 kHz. Throws std::invalid_argument on a push that cannot be run.
+/// Both loops up to the moment when the finger starts, everything at rest before it; bodies as of
+/// PushScene. Throws std::invalid_argument on a push that cannot be run.
+PreparedRun PrepareCubePush(const CubePush& push, const PushLoops& loops);
+
+/// Throws as PrepareCubePush does.
 PushResult SimulateCubePush(const CubePush& push, const PushLoops& loops);
 
 /// The same over `phases` sampling phases, spread over the world period.

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/lab/choose.h"
 #include "tests/lab/extreme_run.h"
 #include "tests/lab/hand_column.h"
 #include "tests/lab/multirate_loop.h"
@@ -50,11 +51,6 @@ const std::vector<ResultColumn> kResults = {{"finite"},
                                             {"largest_force_n", 1e-6},
                                             {"largest_step_n", 1e-6}};
 
-template <typename Value>
-struct Named {
-  const char* name;
-  Value value;
-};
 constexpr Named<ExtremeEvent> kEvents[] = {
     {"slot", ExtremeEvent::kSlot},         {"fast", ExtremeEvent::kFast},
     {"far", ExtremeEvent::kFar},           {"nan", ExtremeEvent::kNotFinite},
@@ -65,17 +61,6 @@ constexpr Named<protocol::Coupling> kCouplings[] = {
     {"impulse", protocol::Coupling::kImpulse},
     {"local", protocol::Coupling::kLocal},
 };
-
-template <typename Value, std::size_t kCount>
-Value Choose(const Row& row, const char* column, const Named<Value> (&entries)[kCount]) {
-  const std::string name = row.Text(column);
-  std::string names;
-  for (const Named<Value>& entry : entries) {
-    if (name == entry.name) return entry.value;
-    names += (names.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  row.Refuse(column, "one of " + names + " is expected");
-}
 
 ExtremeRun ParseRun(const Row& row) {
   ExtremeRun run;
@@ -126,8 +111,6 @@ std::optional<double> GrowthPerPeriod(const ExtremeRun& run) {
   return map.SpectralRadius(run.mass_kg);
 }
 
-// A contact that grew from half a newton at most to the cap is unstable, whatever the linear loop
-// says: that is of one spring that pushes and pulls, the slot of two that push.
 // The truth: 1 unstable, 0 stable, nan = nobody knows. Where the linear loop calls a contact stable
 // that grew from half a newton to the cap, the run is right: the loop has one spring that pushes and
 // pulls, the slot two that push.

@@ -62,9 +62,12 @@ TEST_CASE("haptic_lab tells its cases, options and version") {
 }
 
 TEST_CASE("haptic_lab refuses a wrong command line with 64") {
-  const Ended unknown = Run("fig9");
+  const Ended unknown = Run("fig7");
   CHECK(unknown.exit_code == 64);
-  CHECK(Contains(unknown.output, "there is no case fig9; those that exist: buzz, extremes, fig6"));
+  CHECK(Contains(
+      unknown.output,
+      "there is no case fig7; those that exist: buzz, engine-error, error-vs-runtime, extremes, "
+      "fig6"));
   CHECK(Run("").exit_code == 64);
   CHECK(Run("fig6 extra").exit_code == 64);
   CHECK(Run("fig6 --fast").exit_code == 64);

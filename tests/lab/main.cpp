@@ -9,15 +9,19 @@
 #include "common/daemon.h"
 #include "common/exit_code.h"
 #include "tests/lab/buzz.h"
+#include "tests/lab/engine_error.h"
+#include "tests/lab/error_vs_runtime.h"
 #include "tests/lab/extremes.h"
 #include "tests/lab/fig6.h"
 #include "tests/lab/gallery.h"
 #include "tests/lab/multirate.h"
 #include "tests/lab/planes.h"
+#include "tests/lab/push_traces.h"
 #include "tests/lab/pushes.h"
 #include "tests/lab/scene_cost.h"
 #include "tests/lab/slides.h"
 #include "tests/lab/study.h"
+#include "tests/lab/subjects.h"
 #include "tests/lab/tensions.h"
 #include "tests/lab/wall.h"
 
@@ -26,8 +30,10 @@ namespace {
 namespace po = boost::program_options;
 
 std::vector<Case> Cases() {
-  return {Buzz(),   Extremes(), Fig6(),      Gallery(), MultirateMasses(), MultirateGrowth(),
-          Planes(), Pushes(),   SceneCost(), Slides(),  Tensions(),        Wall()};
+  return {Buzz(),       EngineError(), ErrorVsRuntime(), Extremes(),        Fig6(),
+          PushTraces(), Subjects(),    Gallery(),        MultirateMasses(), MultirateGrowth(),
+          Planes(),     Pushes(),      SceneCost(),      Slides(),          Tensions(),
+          Wall()};
 }
 
 struct Options {

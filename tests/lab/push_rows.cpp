@@ -2,25 +2,20 @@
 
 #include <optional>
 
+#include "tests/lab/choose.h"
+
 namespace rikiseki::lab {
 namespace {
 
-struct Script {
-  const char* name;  // in the tables
-  PushScript script;
-};
-constexpr Script kScripts[] = {
+constexpr Named<PushScript> kScripts[] = {
     {"push", PushScript::kPush},           {"poke", PushScript::kPoke},
     {"hold", PushScript::kHold},           {"press", PushScript::kPress},
     {"offcentre", PushScript::kOffCentre}, {"wall", PushScript::kWall},
     {"neighbour", PushScript::kNeighbour}, {"stick", PushScript::kStick},
+    {"corner", PushScript::kCorner},       {"stack", PushScript::kStack},
 };
 
-struct NamedCoupling {
-  const char* name;
-  std::optional<protocol::Coupling> coupling;
-};
-constexpr NamedCoupling kCouplings[] = {
+constexpr Named<std::optional<protocol::Coupling>> kCouplings[] = {
     {"position", protocol::Coupling::kPosition},
     {"impulse", protocol::Coupling::kImpulse},
     {"local", protocol::Coupling::kLocal},
@@ -29,22 +24,11 @@ constexpr NamedCoupling kCouplings[] = {
 
 constexpr double kSlowWorld = 0.15;  // s: at 5 Hz jumps may be twice as large
 
-template <typename Entry, std::size_t kCount>
-const Entry& Choose(const Row& row, const char* column, const Entry (&entries)[kCount]) {
-  const std::string name = row.Text(column);
-  std::string names;
-  for (const Entry& entry : entries) {
-    if (name == entry.name) return entry;
-    names += (names.empty() ? "" : ", ") + std::string(entry.name);
-  }
-  row.Refuse(column, "one of " + names + " is expected");
-}
-
 }  // namespace
 
 CubePush ParsePush(const Row& row) {
   CubePush push;
-  push.script = Choose(row, "script", kScripts).script;
+  push.script = Choose(row, "script", kScripts);
   push.mass_kg = row.Number("mass_kg", 1e-6, 1e6);
   push.friction = row.NumberOr("mu", 0, 10, push.friction);
   push.stiffness_n_per_m = row.NumberOr("kp", 1, 1e6, push.stiffness_n_per_m);
@@ -59,7 +43,7 @@ CubePush ParsePush(const Row& row) {
 
 PushLoops ParseLoops(const Row& row) {
   PushLoops loops;
-  loops.coupling = Choose(row, "coupling", kCouplings).coupling;
+  loops.coupling = Choose(row, "coupling", kCouplings);
   if (!loops.coupling) return loops;
   loops.world_period_s = row.Number("Tw_s", 1e-3, 10);
   if (row.Find("latency_ticks")) loops.latency_ticks = row.Integer("latency_ticks", 0, 100'000);

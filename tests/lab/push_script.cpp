@@ -9,7 +9,7 @@ constexpr double kApproach = 0.005;      // m, between finger and cube at the st
 constexpr double kFast = 0.3;            // m/s
 constexpr double kSlow = 0.1;            // m/s
 constexpr double kHoldTime = 1.5;        // s, on the way in
-constexpr double kSqueezeDepth = 0.002;  // m, of press and wall
+constexpr double kSqueezeDepth = 0.002;  // m, of press and wall, and in the corner's floor
 constexpr double kStickForce = 1;        // N
 const Vec3 kWallHalf(0.5, 1, 0.5);       // m
 
@@ -19,6 +19,8 @@ double Depth(const CubePush& push) {
     case PushScript::kPush:
     case PushScript::kOffCentre:
     case PushScript::kNeighbour:
+    case PushScript::kCorner:
+    case PushScript::kStack:
       return 0.015;
     case PushScript::kPoke:
       return 0.005;
@@ -36,7 +38,8 @@ double Depth(const CubePush& push) {
 
 bool ComesBack(PushScript script) {
   return script == PushScript::kPush || script == PushScript::kPoke ||
-         script == PushScript::kOffCentre || script == PushScript::kNeighbour;
+         script == PushScript::kOffCentre || script == PushScript::kNeighbour ||
+         script == PushScript::kCorner || script == PushScript::kStack;
 }
 
 world::SceneBody Body(const char* name, const world::Shape& shape, const Vec3& position,
@@ -75,8 +78,10 @@ Vec3 FingerPosition(const CubePush& push, const Vec3& cube, double t_s) {
     gone = std::min(way, t_s * kSlow);
   }
   const Vec3 inwards = push.script == PushScript::kPress ? Vec3(-Vec3::UnitZ()) : Vec3::UnitX();
-  return cube + push.offset_m * Vec3::UnitY() +
-         (gone - kApproach - kFingerRadius - kCubeHalf) * inwards;
+  Vec3 finger = cube + push.offset_m * Vec3::UnitY() +
+                (gone - kApproach - kFingerRadius - kCubeHalf) * inwards;
+  if (push.script == PushScript::kCorner) finger.z() = kFingerRadius - kSqueezeDepth;
+  return finger;
 }
 
 world::Scene PushScene(const CubePush& push) {
@@ -91,6 +96,10 @@ world::Scene PushScene(const CubePush& push) {
     scene.bodies.push_back(MakePushed(PushedShape::kCube, push.neighbour_kg, push.friction,
                                       {2 * kCubeHalf + push.gap_m, 0, kCubeHalf}));
     scene.bodies.back().name = "neighbour";
+  } else if (push.script == PushScript::kStack) {
+    scene.bodies.push_back(
+        MakePushed(PushedShape::kCube, push.neighbour_kg, push.friction, {0, 0, 3 * kCubeHalf}));
+    scene.bodies.back().name = "on top";
   }
   return scene;
 }

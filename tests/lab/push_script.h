@@ -19,6 +19,8 @@ enum class PushScript {
   kWall,       // in at 0.1 m/s, until the cube is squeezed 2 mm deep against a wall behind it
   kNeighbour,  // push, with another cube behind this one
   kStick,      // in at 0.1 m/s to a force of 1 N, and stay for 5 s
+  kCorner,     // push while the finger is 2 mm deep in the floor: two planes at once
+  kStack,      // push, with another cube on top of this one
 };
 
 /// What is pushed, and how.
@@ -31,7 +33,7 @@ struct CubePush {
   double damping_ns_per_m = 0;
   double offset_m = 0;      // of the finger's path, along y
   double gap_m = 0.02;      // between the cube and what stands behind it
-  double neighbour_kg = 1;  // of the cube behind it
+  double neighbour_kg = 1;  // of the cube behind it, or on top
 };
 
 /// How long the script is watched [s].
@@ -40,7 +42,8 @@ double Duration(const CubePush& push);
 /// The centre of the finger [m, in W] at `t_s` >= 0; `cube` is where the cube's centre rests.
 Vec3 FingerPosition(const CubePush& push, const Vec3& cube, double t_s);
 
-/// Body 0 is the cube, or what stands in its place, body 1 the floor; body 2, if the script has one, the wall or the neighbour.
+/// Body 0 is the cube, or what stands in its place, body 1 the floor; body 2, if the script has one, the wall or the
+/// neighbour.
 world::Scene PushScene(const CubePush& push);
 
 }  // namespace rikiseki::lab
