@@ -287,6 +287,12 @@ std::string ConfigSchema::Describe() const {
   return text;
 }
 
+ConfigValues ConfigSchema::Values() const {
+  ConfigValues values;
+  for (const auto& [key, entry] : entries_) values.emplace(key, entry.show());
+  return values;
+}
+
 std::vector<std::string> ConfigSchema::Keys() const {
   std::vector<std::string> keys;
   for (const auto& [key, entry] : entries_) keys.push_back(key);

@@ -22,6 +22,9 @@ class ConfigError : public StartError {
   explicit ConfigError(const std::string& what) : StartError(kExitConfig, what) {}
 };
 
+/// Every key with its effective value in canonical form: equal values are equal texts.
+using ConfigValues = std::map<std::string, std::string>;
+
 /// The keys a program accepts, bound to the variables they set.
 class ConfigSchema {
  public:
@@ -74,6 +77,8 @@ class ConfigSchema {
 
   /// Every key with its effective value, where it came from and its sentence, for `--check`.
   std::string Describe() const;
+
+  ConfigValues Values() const;
 
   /// All keys, sorted, for the test that the shipped files document each.
   std::vector<std::string> Keys() const;

@@ -43,9 +43,9 @@ DaemonOptions ParseDaemonOptions(int argc, char** argv, const std::string& progr
                                  extra[i].doc.c_str());
       continue;
     }
-    line.visible.add_options()(extra[i].name.c_str(),
-                               po::value(&options.extra[i])->value_name(extra[i].value_name),
-                               extra[i].doc.c_str());
+    auto* const value = po::value(&options.extra[i])->value_name(extra[i].value_name);
+    if (!extra[i].implicit.empty()) value->implicit_value(extra[i].implicit);
+    line.visible.add_options()(extra[i].name.c_str(), value, extra[i].doc.c_str());
   }
   ParseCommandLine(argc, argv, line);
   if (options.config.empty()) throw StartError(kExitUsage, "--config FILE is required; try --help");

@@ -21,6 +21,7 @@ struct ExtraOption {
   std::string name;
   std::string value_name;
   std::string doc;
+  std::string implicit = {};  // what the option alone, without a value, means; empty: it needs one
 };
 
 /// Parses the command line. Prints --help and --version itself and exits 0. Throws StartError (64).

@@ -85,10 +85,12 @@ ConfigSchema DaemonSchema(Settings& settings) {
                 "Newtons at the device per newton in the world.");
 
   schema.Choice("device.kind", &settings.device.kind,
-                {{"simulated", DeviceKind::kSimulated}, {"usb", DeviceKind::kUsb}},
+                {{"simulated", DeviceKind::kSimulated},
+                 {"usb", DeviceKind::kUsb},
+                 {"replay", DeviceKind::kReplay}},
                 "Which force display to drive.");
   schema.Path("device.file", &settings.device.file,
-              "The file that describes the display, relative to this one.");
+              "The file that describes the display, or that is replayed, relative to this one.");
 
   HandSettings& hand = settings.hand;
   schema.Choice(
@@ -196,7 +198,7 @@ std::int64_t Settings::period_ns() const {
 }
 
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description) {
+                      std::string* description, ConfigValues* values) {
   const auto is_of_device = [](const std::string& assignment) {
     return assignment.starts_with("spidar.") || assignment.starts_with("usb.");
   };
@@ -208,14 +210,15 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
   }
   if (settings.device.file.empty()) daemon.Refuse("device.file", "the display needs a description");
 
+  const bool described = settings.device.kind != DeviceKind::kReplay;
   ConfigSchema device = DeviceSchema(settings.spidar, settings.usb);
-  device.Load(settings.device.file);
+  if (described) device.Load(settings.device.file);
   for (const std::string& assignment : set) {
     if (is_of_device(assignment)) device.Set(assignment);
   }
 
   if (const auto conflict = FindConflict(settings)) daemon.Refuse(conflict->key, conflict->why);
-  if (const auto conflict = FindConflict(settings.spidar)) {
+  if (const auto conflict = FindConflict(settings.spidar); described && conflict) {
     device.Refuse(conflict->key, conflict->why);
   }
   if (settings.device.kind == DeviceKind::kUsb) {
@@ -225,6 +228,10 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
     if (conflict) device.Refuse(conflict->key, conflict->why);
   }
   if (description != nullptr) *description = daemon.Describe() + device.Describe();
+  if (values != nullptr) {
+    *values = daemon.Values();
+    values->merge(device.Values());
+  }
   return settings;
 }
 

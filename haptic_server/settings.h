@@ -59,11 +59,12 @@ struct MappingSettings {
   double force_scale = 1;            // s_f, newtons at the device per newton in the world
 };
 
-enum class DeviceKind { kSimulated, kUsb };
+enum class DeviceKind { kSimulated, kUsb, kReplay };
 
 struct DeviceSettings {
   DeviceKind kind = DeviceKind::kSimulated;
-  std::string file;  // motor positions, counts, tension bounds: config/devices/*.ini
+  std::string
+      file;  // motor positions, counts, tension bounds: config/devices/*.ini; or a recording
 };
 
 enum class HandScript { kPush, kStir, kRest };
@@ -115,9 +116,10 @@ struct Settings {
 };
 
 /// Reads the daemon's file, the overrides and the device file it names, and checks them against each
-/// other. `description`, if given, receives every key with value and origin. Throws ConfigError.
+/// other. `description`, if given, receives every key with value and origin, `values` those two
+/// alone. Throws ConfigError.
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description = nullptr);
+                      std::string* description = nullptr, ConfigValues* values = nullptr);
 
 /// The checks that involve several keys; throws std::invalid_argument naming them. For settings that
 /// come from code, not from a file.

@@ -66,6 +66,7 @@ struct HapticStep::State {
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         safety(checked),
         energy(checked),
+        tuning(TuningOf(checked), Seconds(period_ns)),
         split({.stiffness_n_per_m = checked.render.stiffness_n_per_m,
                .finger_radius_m = contact.radius()},
               ReplayTicks(checked), own_epoch) {
@@ -85,7 +86,9 @@ struct HapticStep::State {
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
                protocol::HapticTick& message) noexcept;
 
-  const Settings settings;
+  void Tune() noexcept;
+
+  Settings settings;
   const std::int64_t period_ns;
   Device& device;
   Mapping mapping;
@@ -96,6 +99,7 @@ struct HapticStep::State {
   EmergencyStop emergency_stop;
   SafetyStage safety;
   EnergyMeter energy;
+  TuningRamp tuning;
   SplitEnergy split;
 
   std::uint64_t tick = 0;
@@ -118,6 +122,20 @@ void HapticStep::State::NameDevice() noexcept {
   if (*now == '\0') return;
   health.device.fill('\0');
   std::strncpy(health.device.data(), now, health.device.size() - 1);
+}
+
+// The next step on the way to other settings. What the springs gain by growing stiffer is no leak of the
+// rendering, and the energy meter is not to take it for one. // RT:
+void HapticStep::State::Tune() noexcept {
+  Adopt(tuning.Advance(), settings);
+  contact.Tune(settings.render);
+  safety.Tune(settings.safety);
+  energy.Tune(settings.safety);
+  split.Tune(settings.render.stiffness_n_per_m);
+  device.SetVelocityCutoff(settings.spidar.velocity_cutoff_hz);
+  energy.Skip();
+  health.slew_limit = settings.safety.slew_limit_n_per_s * mapping.force_in_world();
+  bounded_period_ns = -1;
 }
 
 // Puts a measurement into the world. False, and nothing is taken, if it does not lie there. // RT:
@@ -239,6 +257,7 @@ HapticStep::~HapticStep() = default;
 void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message,
                       const OperatorInput& wish) noexcept {
   State& state = *state_;
+  if (state.tuning.moves()) state.Tune();
   SafetyInput input;
   DeviceSample measured;
   input.device_ok = state.device.Read(time.start_ns, measured) == DeviceStatus::kOk;
@@ -298,6 +317,10 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
     return state.intake.track().Has(body, generation, kPointer);
   });
   state.Publish(time, displayed, state.safety.reason(), message);
+}
+
+void HapticStep::Tune(const Tuning& target) noexcept {
+  state_->tuning.Start(target);
 }
 
 void HapticStep::Stop(std::int64_t now_ns, protocol::HapticTick& message) noexcept {

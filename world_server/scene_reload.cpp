@@ -35,10 +35,10 @@ SceneReload::~SceneReload() {
   thread_.join();
 }
 
-void SceneReload::Restart() {
+void SceneReload::Restart(const std::string& scene_file) {
   {
     const std::lock_guard lock(mutex_);
-    restart_ = true;
+    restart_ = scene_file;
   }
   wake_.notify_one();
 }
@@ -53,10 +53,11 @@ void SceneReload::Work() {
       wake_.wait(lock, asked);
     }
     if (stop_) return;
-    const bool restart = std::exchange(restart_, false);
+    const std::optional<std::string> restart = std::exchange(restart_, std::nullopt);
     lock.unlock();
     std::optional<Result> result;
     if (restart) {
+      settings_.scene.file = *restart;
       watch_.Accept();
       result = Read(Replacement::kRestart);
     } else if (watch_.Look()) {

@@ -42,9 +42,9 @@ class SceneReload {
   SceneReload(const SceneReload&) = delete;
   SceneReload& operator=(const SceneReload&) = delete;
 
-  /// Reads the scene again, and everything that moves starts anew. A second request while one is
-  /// under way starts another after it.
-  void Restart();
+  /// Reads this scene, and everything that moves starts anew. A second request while one is under way
+  /// starts another after it.
+  void Restart(const std::string& scene_file);
 
   /// Puts what was read since the last call in the place of the running scene; nothing if nothing
   /// was. Files that were changed and say the same as before change nothing and are no news.
@@ -60,14 +60,14 @@ class SceneReload {
   void Work();
   Result Read(Replacement how);
 
-  const Settings settings_;
-  FileWatch watch_;  // of the thread alone
+  Settings settings_;  // of the thread alone
+  FileWatch watch_;    // likewise
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  bool stop_ = false;             // under the mutex, as what follows
-  bool restart_ = false;          // asked for
-  std::optional<Result> result_;  // not yet taken
+  bool stop_ = false;                   // under the mutex, as what follows
+  std::optional<std::string> restart_;  // the scene that was asked for
+  std::optional<Result> result_;        // not yet taken
   std::thread thread_;
 };
 

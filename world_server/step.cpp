@@ -220,6 +220,14 @@ void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
   s.health.discarded = s.ledger.life_books().discarded;
 }
 
+void WorldStep::Tune(const Settings& settings) {
+  Settings& mine = state_->settings;
+  mine.coupling.force_cap_n = settings.coupling.force_cap_n;
+  mine.coupling.gap_ms = settings.coupling.gap_ms;
+  mine.features.radius_mm = settings.features.radius_mm;
+  state_->ledger.SetLargestImpulse(mine.coupling.force_cap_n * mine.gap_s());
+}
+
 void WorldStep::Replace(Scene scene, std::unique_ptr<DynamicsWorld> dynamics, Replacement how) {
   const std::vector<BodyChange> changes = how == Replacement::kRestart
                                               ? Restarted(state_->scene, scene)

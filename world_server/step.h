@@ -39,6 +39,9 @@ class WorldStep {
   /// pointer, and fills the next frame.
   void Tick(double period_s, protocol::WorldFrame& frame);
 
+  /// From the next tick on, another force cap, gap and reach of the features. Nothing else is taken.
+  void Tune(const Settings& settings);
+
   /// Puts another scene in the place of this one, with dynamics that nobody has stepped yet. What is
   /// the same keeps its name on the wire, what goes on is where it was. The books go on: what is
   /// pending for a body that is no more is discarded.

@@ -39,6 +39,9 @@ class Device {
   /// stop. // RT:
   virtual void Release() noexcept = 0;
 
+  /// Another corner [Hz] of the filter behind DeviceSample::velocity, where there is one. // RT:
+  virtual void SetVelocityCutoff(double /*cutoff_hz*/) noexcept {}
+
   virtual std::string Name() const = 0;
 
   /// What is known to be wrong while Read is a fault, for the log; else empty. From any thread.

@@ -27,6 +27,9 @@ class Spidar final : public Device {
   DeviceStatus Read(std::int64_t now_ns, DeviceSample& sample) noexcept override;
   Vec3 Write(const Vec3& force) noexcept override;
   void Release() noexcept override;
+  void SetVelocityCutoff(double cutoff_hz) noexcept override {
+    settings_.velocity_cutoff_hz = cutoff_hz;
+  }
   std::string Name() const override;
 
   /// The board's own, else the string that makes Read a fault, counted from 1 as the motors of the

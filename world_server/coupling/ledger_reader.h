@@ -65,6 +65,9 @@ class LedgerReader {
   /// whole.
   LedgerReader(std::uint64_t own_epoch, protocol::Coupling coupling, double largest_impulse_ns);
 
+  /// Another bound, from the next message on.
+  void SetLargestImpulse(double largest_impulse_ns) { largest_impulse_ns_ = largest_impulse_ns; }
+
   /// Says which bodies there are, by their number on the wire. What is pending for one that is no
   /// longer what it was is discarded as kUnknownBody; for the others it stays.
   void SetBodies(std::vector<BodyTag> bodies);

@@ -9,7 +9,7 @@
 namespace rikiseki::haptic {
 
 std::unique_ptr<Device> OpenDevice(const Settings& settings) {
-  if (settings.device.kind == DeviceKind::kSimulated) return MakeDevice(settings);
+  if (settings.device.kind != DeviceKind::kUsb) return MakeDevice(settings);
   return std::make_unique<Spidar>(settings.spidar, OpenUsbBoard(settings));
 }
 
@@ -20,7 +20,7 @@ std::unique_ptr<MotorBoard> OpenUsbBoard(const Settings& settings) {
 }
 
 std::string DescribeBoard(const Settings& settings) {
-  if (settings.device.kind == DeviceKind::kSimulated) return "";
+  if (settings.device.kind != DeviceKind::kUsb) return "";
   try {
     const OpenBoard board = FindBoard(settings.usb);
     return "board " + BoardName(settings.usb.board) + " at " + board.place + ", switch at " +
