@@ -158,6 +158,7 @@ void WorldStep::State::NameOnWire(protocol::WorldFrame& told) const {
   for (protocol::LocalBody& local : std::span(told.local_bodies).first(told.local_body_count)) {
     local.body = numbers.numbers()[local.body];
     for (protocol::ContactPlane& contact : std::span(local.contacts).first(local.contact_count)) {
+      if (contact.other_body == kNoBody) continue;
       contact.other_body = numbers.numbers()[contact.other_body];
     }
   }

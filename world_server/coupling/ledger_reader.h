@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct ReplayImpulse {
   // and N m s^2, which says when within it the impulse came.
   Vec3 first_moment = Vec3::Zero();
   Vec3 angular_first_moment = Vec3::Zero();
+  std::optional<Vec3> point = {};  // m, where it acted last
 };
 
 /// One consumed message, for `local`: the time it covers and what was displayed in it.
@@ -110,6 +112,7 @@ class LedgerReader {
     protocol::ImpulseUnits angular_impulse{};
     Vec3 first_moment = Vec3::Zero();  // of what came since the message before
     Vec3 angular_first_moment = Vec3::Zero();
+    Vec3 point = Vec3::Zero();  // m, of the latest contact
   };
   struct OwedUnits {
     protocol::ImpulseUnits impulse{};

@@ -88,6 +88,7 @@ struct BulletWorld::Engine {
     broadphase.optimize();
   }
 
+  Kick KickOn(const PlacedImpulse& push) const;
   void Mark(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse);
   void Apply(const Kick& kick);
   void Apply(const PlacedImpulse& push);
@@ -98,6 +99,13 @@ struct BulletWorld::Engine {
                  double window_s, double substep_s, bool long_substeps);
   void Step(const Group& group, double length_s, double longest_s, int sweeps);
 };
+
+// Of a body that moves, as it is now.
+Kick BulletWorld::Engine::KickOn(const PlacedImpulse& push) const {
+  const MovingBody& body = bodies.moving[bodies.moving_of[push.body]];
+  const Vec3 centre = body.State().pose.position;
+  return KickOf(WithinReach(push, centre, body.outer_radius), centre);
+}
 
 // A push is on its way, or has come: its body wakes.
 void BulletWorld::Engine::Mark(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse) {
@@ -123,9 +131,8 @@ void BulletWorld::Engine::Apply(const Kick& kick) {
 
 void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
   const std::size_t place = bodies.moving_of[push.body];
-  const MovingBody& body = bodies.moving[place];
-  const Kick kick = KickOf(push, body.State().pose.position);
-  ApplyKick(body, kick.impulse, kick.angular_impulse);
+  const Kick kick = KickOn(push);
+  ApplyKick(bodies.moving[place], kick.impulse, kick.angular_impulse);
   world.joints().Settle(place);
 }
 
@@ -170,7 +177,7 @@ void BulletWorld::Engine::PassWindow(std::span<const FineStep> steps, double win
       const std::size_t body = bodies.moving_of[push.body];
       if (body == BulletBodies::kFixed) continue;
       // About a centre that may move a little until then.
-      const Kick kick = KickOf(push, bodies.moving[body].State().pose.position);
+      const Kick kick = KickOn(push);
       Mark(body, kick.impulse, kick.angular_impulse);
     }
   }
@@ -288,7 +295,7 @@ void BulletWorld::Play(std::span<const Stretch> stretches) {
 
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
-  if (!engine_ || scene_.bodies[body].fixed || IsJointed(scene_, body)) return false;
+  if (!engine_ || scene_.bodies[body].fixed) return false;
   const std::size_t place = engine_->bodies.moving_of[body];
   const std::vector<std::size_t> others = engine_->islands.Near(place, reach_m);
   const std::size_t first = sites.size();
