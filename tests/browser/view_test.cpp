@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <map>
 #include <mutex>
 #include <sstream>
@@ -19,8 +20,8 @@ using namespace rikiseki;        // NOLINT(google-build-using-namespace)
 using namespace rikiseki::test;  // NOLINT(google-build-using-namespace)
 using nlohmann::json;
 
-constexpr int kWidth = 640;
-constexpr int kHeight = 360;
+constexpr int kWidth = 900;  // wide enough for the desk layout
+constexpr int kHeight = 440;
 constexpr double kSlewLimit = 5000;      // N/s, of the shipped file
 constexpr std::size_t kEmptyPng = 4000;  // bytes; a window of one colour has 1 to 2 kB
 
@@ -77,8 +78,28 @@ bool InContact(const json& picture) {
 
 bool ShowsScene(const json& picture) {
   return picture["bodies"].size() == 2 && picture["bodies"][0]["drawn"] > 0 &&
-         picture["bodies"][1]["drawn"] > 0 && picture["bodies"][1]["position"][0].is_number() && picture["frames"] > 2 &&
-         picture["fingers"].size() == 1 && picture["banner"] == "";
+         picture["bodies"][1]["drawn"] > 0 && picture["bodies"][1]["position"][0].is_number() &&
+         picture["frames"] > 2 && picture["fingers"].size() == 1 && picture["banner"] == "";
+}
+
+/// Puts the block back to where it can be pushed, when the finger is not in its way.
+void ResetBlock(Chromium& page, WatchedPair& pair) {
+  AwaitPicture(page, [](const json& picture) {
+    return picture["fingers"].size() == 1 && picture["fingers"][0]["position"][0] < -0.045;
+  });
+  pair.world->Signal(SIGHUP);
+}
+
+/// A picture for which `holds`, which a push makes true. One push throws the block out of reach, perhaps
+/// before the page was there.
+json AwaitPush(Chromium& page, WatchedPair& pair, bool (*holds)(const json& picture)) {
+  json picture;
+  for (int i = 0; i < 15; ++i) {
+    ResetBlock(page, pair);
+    picture = AwaitPicture(page, holds, 3);  // a push comes every 1.2 s
+    if (holds(picture)) break;
+  }
+  return picture;
 }
 
 /// Two looks at one moment: the picture, and the frames that the page remembers.
@@ -102,7 +123,7 @@ TEST_CASE("the picture is what stands in shared memory: block, planes, force, im
   const std::size_t place = MovingPlace(scene);
 
   // The first contact, the page's own clock stopped to look at it.
-  const json contact = AwaitPicture(page, InContact);
+  const json contact = AwaitPush(page, pair, InContact);
   REQUIRE(InContact(contact));
   CHECK(page.Screenshot("view-contact").size() > kEmptyPng);
   std::map<std::uint64_t, WatchedTick> by_tick;
@@ -111,23 +132,24 @@ TEST_CASE("the picture is what stands in shared memory: block, planes, force, im
   REQUIRE(by_tick.contains(shown_tick));
   CHECK(contact["fingers"][0]["force"][0] == by_tick[shown_tick].force_x);  // to the bit
   CHECK(contact["fingers"][0]["position"][0] == by_tick[shown_tick].finger_x);
-  // The proxy is on the surface, where the finger's centre is pressed away from: along the force.
-  const double pressed = contact["fingers"][0]["position"][0].get<double>() -
-                         contact["fingers"][0]["proxy"][0].get<double>();
-  CHECK(pressed >= 0);
-  CHECK(contact["fingers"][0]["force"][0] < 0);
+  // The force points from the finger's centre to the proxy on the surface, out of the block.
+  const json& finger = contact["fingers"][0];
+  CHECK((finger["proxy"][0].get<double>() - finger["position"][0].get<double>()) *
+            finger["force"][0].get<double>() >=
+        0);
 
-  const json flashing = AwaitPicture(page, [](const json& picture) {
+  // The frame after brings the impulse, and the copies come with every frame near the block.
+  const auto flashes = [](const json& picture) {
     return picture["drawn"]["flashes"] > 0 && picture["drawn"]["ghosts"] > 0;
-  });
-  CHECK(flashing["drawn"]["flashes"] > 0);
-  CHECK(flashing["drawn"]["ghosts"] > 0);
+  };
+  CHECK(flashes(AwaitPush(page, pair, flashes)));
 
   // While the block moves, every frame that the page has is to the bit what the segment held, and the
   // block stands between the two frames about the moment shown.
+  ResetBlock(page, pair);
   double least = 1e9;
   double most = -1e9;
-  for (int i = 0; i < 400 && most - least < 0.02; ++i) {
+  for (int i = 0; i < 1000 && most - least < 0.02; ++i) {
     const json look = PictureAndFrames(page);
     const json& shown = look["picture"]["bodies"][place]["position"];
     const double time = look["picture"]["time"];
@@ -139,6 +161,7 @@ TEST_CASE("the picture is what stands in shared memory: block, planes, force, im
     }
     REQUIRE(before != nullptr);
     const json& from = (*before)["bodies"][place];
+    if (from.is_null()) continue;  // of the time before the block was put back
     const json& to = after == nullptr ? from : (*after)["bodies"][place];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = std::min(from[axis].get<double>(), to[axis].get<double>());
@@ -154,16 +177,19 @@ TEST_CASE("the picture is what stands in shared memory: block, planes, force, im
   CHECK(most - least >= 0.02);
   const json remembered = PictureAndFrames(page)["frames"];
   const auto held = bodies.Positions();
+  std::size_t of_this_block = 0;
   std::size_t compared = 0;
   for (const json& frame : remembered) {
     const auto found = held.find(frame["stamp"].get<std::uint64_t>());
+    if (frame["bodies"][place].is_null()) continue;
+    ++of_this_block;
     if (found == held.end()) continue;  // this watch slept through it
     ++compared;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       CHECK(frame["bodies"][place][axis] == found->second[axis]);
     }
   }
-  CHECK(compared > remembered.size() / 4);
+  CHECK(compared > of_this_block / 4);
 
   // The books of the last 5 s.
   std::istringstream csv(page.Evaluate("rikiseki.csv()").get<std::string>());
@@ -194,11 +220,16 @@ TEST_CASE("pause and step back, by key; phone width and dark") {
   pair.StartViewer();
   Chromium page(pair.url(), kWidth, kHeight);
   REQUIRE(ShowsScene(AwaitPicture(page, ShowsScene)));
-  REQUIRE(InContact(AwaitPicture(page, InContact)));
+  REQUIRE(InContact(AwaitPush(page, pair, InContact)));
 
   page.Press(" ");
-  const json paused = AwaitPicture(page, [](const json& picture) { return picture["paused"]; });
-  REQUIRE(paused["paused"]);
+  // All that was under way when the picture stopped has come.
+  const auto settled = [](const json& picture) {
+    return picture["paused"].get<bool>() &&
+           picture["now"].get<double>() > picture["time"].get<double>() + 1e9;
+  };
+  const json paused = AwaitPicture(page, settled);
+  REQUIRE(settled(paused));
   const json later =
       AwaitPicture(page, [&](const json& picture) { return picture["ticks"] > paused["ticks"]; });
   CHECK(later["ticks"] > paused["ticks"]);  // it goes on listening
@@ -214,7 +245,7 @@ TEST_CASE("pause and step back, by key; phone width and dark") {
   page.Press("ArrowRight");
   const json forward =
       AwaitPicture(page, [&](const json& picture) { return picture["time"] > back["time"]; });
-  CHECK(forward["frame"].get<int>() == back["frame"].get<int>() + 1);
+  CHECK(forward["frame"] > back["frame"]);  // by one, but where the page slept through some
   page.Press("ArrowLeft", true);
   const json second =
       AwaitPicture(page, [&](const json& picture) { return picture["time"] < forward["time"]; });
@@ -228,7 +259,7 @@ TEST_CASE("pause and step back, by key; phone width and dark") {
   page.SetDark(true);
   CHECK(page.Evaluate("document.documentElement.scrollWidth <= innerWidth").get<bool>());
   CHECK(page.Evaluate("getComputedStyle(document.body).color") == "rgb(230, 231, 234)");
-  REQUIRE(InContact(AwaitPicture(page, InContact)));
+  REQUIRE(InContact(AwaitPush(page, pair, InContact)));
   CHECK(page.Screenshot("view-phone-dark").size() > kEmptyPng);
   // Every button can be reached and says what it does.
   CHECK(page.Evaluate("[...document.querySelectorAll('button')].every("
@@ -239,40 +270,52 @@ TEST_CASE("pause and step back, by key; phone width and dark") {
 TEST_CASE("interpolation moves monotonically at 5 Hz where the raw view steps") {
   WatchedPair pair({"loop.rate_hz=5"});
   pair.StartWorld();
-  pair.StartHaptic();
   pair.StartViewer();
   Chromium page(pair.url(), kWidth, kHeight);
-  const json scene = AwaitPicture(page, ShowsScene);
-  REQUIRE(ShowsScene(scene));
-  const std::size_t place = MovingPlace(scene);
-
-  // Until the block has been pushed: then both views are drawn over the same remembered seconds, at
-  // moments of our own, every 10 ms, which no load of the machine can thin out.
-  const std::string x = "rikiseki.picture().bodies[" + std::to_string(place) + "].position[0]";
-  const double start = page.Evaluate(x);
-  REQUIRE(AwaitPicture(page, [&](const json& picture) {
-            return picture["bodies"][place]["position"][0] > start + 0.05;
-          })["bodies"][place]["position"][0] > start + 0.05);
-  const auto sweep = [&](bool interpolate) {
-    return page.Evaluate("rikiseki.sweep(" + std::to_string(place) + ", " +
-                         (interpolate ? "true" : "false") + ", 10e6)");
+  const auto shows_block = [](const json& picture) {
+    return picture["bodies"].size() == 2 && picture["bodies"][1]["position"][0].is_number();
   };
-  const json smooth = sweep(true);
-  const json raw = sweep(false);
-  REQUIRE(smooth.size() > 100);
-  int smooth_places = 0;
-  int raw_places = 0;
+  const json scene = AwaitPicture(page, shows_block);
+  REQUIRE(shows_block(scene));
+  const std::size_t place = MovingPlace(scene);
+  const double start = scene["bodies"][place]["position"][0];
+  pair.StartHaptic();  // the first push is seen from its beginning
+  const auto pushed = [&](const json& picture) {
+    return std::abs(picture["bodies"][place]["position"][0].get<double>() - start) > 0.05;
+  };
+  REQUIRE(pushed(AwaitPicture(page, pushed)));
+
+  // Both ways to draw it, over the same remembered seconds, at moments of our own, every 10 ms, which no
+  // load of the machine can thin out: [frame before the moment, x].
+  const json look = page.Evaluate("({ frames: rikiseki.frames(), smooth: rikiseki.sweep(" +
+                                  std::to_string(place) + ", true, 10e6), raw: rikiseki.sweep(" +
+                                  std::to_string(place) + ", false, 10e6) })");
+  std::map<std::uint64_t, double> x_of_frame;
+  for (const json& frame : look["frames"]) {
+    x_of_frame[frame["number"]] = frame["bodies"][place][0];
+  }
+  const auto moves = [](const json& sweep) {
+    int count = 0;
+    for (std::size_t i = 1; i < sweep.size(); ++i) {
+      const double way = sweep[i][1].get<double>() - sweep[i - 1][1].get<double>();
+      if (std::abs(way) > 1e-6) ++count;
+    }
+    return count;
+  };
+  const json& smooth = look["smooth"];
+  REQUIRE(smooth.size() > 40);
   for (std::size_t i = 1; i < smooth.size(); ++i) {
-    // Pushed along +x and braked by friction, the block never goes back.
-    CHECK(smooth[i].get<double>() >= smooth[i - 1].get<double>() - 1e-6);
-    smooth_places += smooth[i].get<double>() > smooth[i - 1].get<double>() + 1e-6 ? 1 : 0;
+    const std::uint64_t frame = smooth[i][0];
+    if (smooth[i - 1][0] != frame || !x_of_frame.contains(frame + 1)) continue;
+    // From one frame to the next it goes one way.
+    const double whole = x_of_frame[frame + 1] - x_of_frame[frame];
+    const double way = smooth[i][1].get<double>() - smooth[i - 1][1].get<double>();
+    CHECK(way * whole >=
+          -1e-15);  // rounding of a cubic of numbers below 1 m, times a way below 1 m
   }
-  for (std::size_t i = 1; i < raw.size(); ++i) {
-    raw_places += raw[i].get<double>() > raw[i - 1].get<double>() + 1e-6 ? 1 : 0;
-  }
-  CHECK(raw_places >= 1);
-  CHECK(smooth_places >
-        5 * raw_places);  // 20 moments between two frames, less where it comes to rest
+  CHECK(moves(look["raw"]) >= 1);
+  // 20 moments from frame to frame, where the raw view steps once; fewer where it comes to rest.
+  CHECK(moves(smooth) > 5 * moves(look["raw"]));
 
   // And the button does it.
   page.Press("i");
@@ -300,7 +343,7 @@ TEST_CASE("the banner says when and why there is no force, and the page recovers
   CHECK(page.Screenshot("view-world-killed").size() > kEmptyPng);
   pair.StartWorld();
   CHECK(ShowsScene(AwaitPicture(page, ShowsScene)));
-  REQUIRE(InContact(AwaitPicture(page, InContact)));
+  REQUIRE(InContact(AwaitPush(page, pair, InContact)));
 
   pair.haptic->Signal(SIGKILL);
   pair.haptic->Wait();

@@ -40,9 +40,9 @@ nlohmann::json Picture(Chromium& page) {
   return page.Evaluate("window.rikiseki ? rikiseki.picture() : null");
 }
 
-nlohmann::json AwaitPicture(Chromium& page,
-                            const std::function<bool(const nlohmann::json&)>& holds) {
-  const auto limit = Clock::now() + std::chrono::seconds(60);
+nlohmann::json AwaitPicture(Chromium& page, const std::function<bool(const nlohmann::json&)>& holds,
+                            double seconds) {
+  const auto limit = Clock::now() + std::chrono::duration<double>(seconds);
   nlohmann::json picture;
   do {
     picture = Picture(page);

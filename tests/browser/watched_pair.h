@@ -42,10 +42,10 @@ class WatchedPair {
 /// What the page shows, in numbers: window.rikiseki.picture() of main.js.
 nlohmann::json Picture(Chromium& page);
 
-/// Polls the page until `holds` of its picture, at most 60 s; the last picture. Whether it came to hold
-/// is the caller's to check.
-nlohmann::json AwaitPicture(Chromium& page,
-                            const std::function<bool(const nlohmann::json&)>& holds);
+/// Polls the page until `holds` of its picture, at most so long; the last picture. Whether it came to
+/// hold is the caller's to check.
+nlohmann::json AwaitPicture(Chromium& page, const std::function<bool(const nlohmann::json&)>& holds,
+                            double seconds = 60);
 
 /// Length of a vector of the page.
 double Length(const nlohmann::json& vector);

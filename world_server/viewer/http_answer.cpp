@@ -54,6 +54,7 @@ HttpAnswer AnswerMesh(std::string_view name, const protocol::WorldScene& scene) 
 bool IsOwnHost(std::string_view host) {
   const bool bracketed = host.starts_with('[');
   const std::size_t end = host.find(bracketed ? ']' : ':');
+  if (bracketed && end == std::string_view::npos) return false;
   const std::string name(bracketed ? host.substr(1, end - 1) : host.substr(0, end));
   if (name == "localhost") return true;
   std::array<std::uint8_t, sizeof(in6_addr)> address{};

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -109,7 +110,21 @@ Json Frame(const SeenFrame& frame) {
   }
   return {{"number", frame.message.frame}, {"stamp_ns", frame.stamp_ns},
           {"state_ns", frame.state_ns},    {"period_ns", frame.message.period_ns},
-          {"planes", std::move(planes)},   {"copies", std::move(copies)}};
+          {"planes", std::move(planes)},   {"copies", std::move(copies)},
+          {"bodies", frame.bodies.size()}};
+}
+
+/// The first of the frames that a browser is told.
+std::deque<SeenFrame>::const_iterator FirstToTell(const std::deque<SeenFrame>& frames,
+                                                  std::uint64_t told) {
+  auto first = frames.end();
+  std::size_t bodies = 0;
+  while (first != frames.begin() && std::prev(first)->sequence > told) {
+    bodies += std::prev(first)->bodies.size();
+    if (bodies > kMostBodies && first != frames.end()) break;
+    --first;
+  }
+  return first;
 }
 
 void Append(std::vector<double>& numbers, const protocol::Vector& v) {
@@ -200,24 +215,20 @@ std::string UpdateMessage(const PairWatch& watch, std::int64_t now_ns, Told& tol
   for (auto tick = first; tick != ticks.end(); ++tick) {
     pointers = std::max<std::size_t>(pointers, tick->pointer_count);
   }
-  const SeenFrame& frame = watch.frame();
-  const bool frame_is_news = frame.sequence != told.frame && frame.stamp_ns != 0;
+  const auto first_frame = FirstToTell(watch.frames(), told.frame);
 
   Json head{{"now_ns", now_ns}, {"haptic", Haptic(watch)}, {"world", World(watch)}};
   head["contacts"] = Contacts(watch.newest_tick());
   head["ticks"] = {{"count", count}, {"pointers", pointers}};
-  head["bodies"] = frame_is_news ? frame.bodies.size() : 0;
-  if (frame_is_news) head["frame"] = Frame(frame);
-
+  head["frames"] = Json::array();
   std::vector<double> numbers;
-  numbers.reserve(count * (kTickNumbers + pointers * kPointerNumbers) +
-                  (frame_is_news ? frame.bodies.size() * kBodyNumbers : 0));
   for (auto tick = first; tick != ticks.end(); ++tick) Append(numbers, *tick, pointers);
-  if (frame_is_news) {
-    for (const protocol::Body& body : frame.bodies) Append(numbers, body);
+  for (auto frame = first_frame; frame != watch.frames().end(); ++frame) {
+    head["frames"].push_back(Frame(*frame));
+    for (const protocol::Body& body : frame->bodies) Append(numbers, body);
+    told.frame = frame->sequence;
   }
   told.tick = watch.tick_count();
-  told.frame = frame.sequence;
 
   std::string text = head.dump();
   text.append((8 - (sizeof(std::uint32_t) + text.size()) % 8) % 8, ' ');

@@ -2,11 +2,11 @@
 //
 //   u32 bytes of the head | head, JSON, padded by spaces so that what follows lies at a multiple of 8
 //   f64 ticks[head.ticks.count][kTickNumbers + head.ticks.pointers * kPointerNumbers]
-//   f64 bodies[head.bodies][kBodyNumbers]
+//   f64 bodies[head.frames[0].bodies][kBodyNumbers], then those of the next frame, ...
 //
 // little-endian, SI units, world axes; times are ns of CLOCK_MONOTONIC, ids that may pass 2^53 are
-// strings. Ticks are those since the update before, or the last kMostTicks of them; frame and bodies
-// are there if they are newer than what this browser has. page/src/decode.js reads it.
+// strings. Ticks are those since the update before, or the last kMostTicks of them; frames likewise,
+// or as many of the last as hold kMostBodies, one at least. page/src/decode.js reads it.
 #pragma once
 
 #include <cstddef>
@@ -24,6 +24,7 @@ inline constexpr std::size_t kPointerNumbers = 9;
 /// body, generation, position x y z, orientation w x y z, velocity x y z
 inline constexpr std::size_t kBodyNumbers = 12;
 inline constexpr std::uint64_t kMostTicks = 2000;
+inline constexpr std::size_t kMostBodies = 10'000;
 
 /// A browser is sent so many updates, and then one more for each message that it sends: its word that
 /// it has taken one in.

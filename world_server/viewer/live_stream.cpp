@@ -65,10 +65,10 @@ void LiveStream::TellSoon() {
 
 void LiveStream::Tell() {
   if (ended_) return;
+  watch_.Poll(MonotonicNow());  // also for a slow browser: what it will be told must not be missed
   if (credit_ == 0) return TellSoon();
   --credit_;
   Listen();
-  watch_.Poll(MonotonicNow());
   if (!SceneIsNews(watch_, told_)) return TellUpdate();
   message_ = SceneMessage(watch_, told_);
   socket_.text(true);

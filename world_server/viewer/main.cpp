@@ -15,7 +15,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-constexpr int kNiceness = 10;  // where processors are short, the pair comes first
+constexpr int kNiceness = 5;  // where processors are short, the pair comes first
 
 struct Options {
   std::string instance = "0";

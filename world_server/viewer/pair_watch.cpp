@@ -19,13 +19,10 @@ constexpr std::int64_t kPollNs = 5'000'000;
 constexpr std::int64_t kLookNs = 100'000'000;  // between two looks at the owners
 constexpr std::size_t kTicksKept = 4096;
 constexpr std::uint64_t kSameMomentNs = 1'000'000;  // a frame and its bodies are published together
+constexpr std::uint64_t kBodiesAwaitedNs = 20'000'000;  // by other worlds, perhaps, or not at all
 
 bool IsOver(const PeerView& view) {
   return !view.OwnerAlive() || !view.IsCurrent();
-}
-
-std::uint64_t Apart(std::uint64_t a, std::uint64_t b) {
-  return a > b ? a - b : b - a;
 }
 
 template <typename Health>
@@ -70,13 +67,14 @@ void PairWatch::LookForWorld() {
   world_ = {};
   world_.attached = world_view_ != nullptr;
   world_.why = std::move(result.text);
-  if (world_view_ == nullptr) return;  // the last frame stays
+  if (world_view_ == nullptr) return;
   world_.epoch = world_view_->epoch();
   frame_reader_ = world_view_->Reader<protocol::WorldFrame>();
   world_health_reader_ = world_view_->Reader<protocol::WorldHealth>();
   bodies_ = protocol::BodiesReader(world_view_->Stream(StreamType::kWorldBodies));
   scenes_ = protocol::SceneReader(world_view_->Stream(StreamType::kWorldScene));
-  frame_ = {.sequence = frame_.sequence, .message = {}, .bodies = {}};
+  frames_.clear();
+  pending_ = {};
   stamps_ = {};
 }
 
@@ -96,7 +94,7 @@ void PairWatch::Poll(std::int64_t now_ns) {
   }
   if (world_view_ != nullptr) {
     ReadFrames();
-    ReadBodies();
+    CompleteFrame(static_cast<std::uint64_t>(now_ns));
     ReadSide(*world_view_, world_health_reader_, world_);
     scenes_.ReadLatest();
   }
@@ -123,27 +121,30 @@ void PairWatch::ReadTicks() {
 
 void PairWatch::ReadFrames() {
   protocol::WorldFrame frame;
-  bool fresh = false;
   while (true) {
     const ReadStatus status = frame_reader_.ReadNext(frame);
     if (status == ReadStatus::kRejected && !frame_reader_.hopeless()) continue;
-    if (status != ReadStatus::kFresh) break;
-    fresh = true;
-    stamps_[frame.frame % stamps_.size()] = {frame.frame, frame_reader_.received().stamp_ns};
+    if (status != ReadStatus::kFresh) return;
+    const std::uint64_t stamp_ns = frame_reader_.received().stamp_ns;
+    stamps_[frame.frame % stamps_.size()] = {frame.frame, stamp_ns};
+    pending_.stamp_ns = stamp_ns;
+    pending_.message = frame;
   }
-  if (!fresh) return;
-  const std::uint64_t stamp_ns = frame_reader_.received().stamp_ns;
-  ++frame_.sequence;
-  frame_.stamp_ns = stamp_ns;
-  frame_.state_ns = std::max(frame_.state_ns + 1, StateTime(frame, stamp_ns));
-  frame_.message = frame;
 }
 
-void PairWatch::ReadBodies() {
-  if (bodies_.ReadLatest() != ReadStatus::kFresh) return;
-  // A frame may have been published between the two looks.
-  if (Apart(bodies_.received().stamp_ns, frame_.stamp_ns) > kSameMomentNs) ReadFrames();
-  frame_.bodies.assign(bodies_.bodies().begin(), bodies_.bodies().end());
+void PairWatch::CompleteFrame(std::uint64_t now_ns) {
+  bodies_.ReadLatest();
+  const std::uint64_t bodies_ns = bodies_.received().stamp_ns;
+  if (bodies_ns > pending_.stamp_ns + kSameMomentNs) ReadFrames();  // one came between the looks
+  if (pending_.stamp_ns == 0) return;
+  const bool may_come = now_ns < pending_.stamp_ns + kBodiesAwaitedNs;
+  if (bodies_ns + kSameMomentNs < pending_.stamp_ns && may_come) return;
+  const std::uint64_t earliest_ns = frames_.empty() ? 0 : frames_.back().state_ns + 1;
+  pending_.sequence = ++frame_count_;
+  pending_.state_ns = std::max(earliest_ns, StateTime(pending_.message, pending_.stamp_ns));
+  pending_.bodies.assign(bodies_.bodies().begin(), bodies_.bodies().end());
+  frames_.push_back(std::exchange(pending_, {}));
+  if (frames_.size() > kFramesKept) frames_.pop_front();
 }
 
 std::uint64_t PairWatch::StateTime(const protocol::WorldFrame& frame,

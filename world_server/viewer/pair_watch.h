@@ -1,5 +1,5 @@
 // Looks at both segments, read-only, and keeps what a picture of the pair needs: the haptic ticks of
-// the last seconds, the newest frame with the bodies as they were in it, the scene, and both sides'
+// the last seconds, the last frames with the bodies as they were in them, the scene, and both sides'
 // health. Either side may be missing, come and go.
 //
 // Nothing is read but by Poll: a viewer at which nobody looks costs the pair nothing. One thread.
@@ -30,6 +30,8 @@ struct SeenTick {
   std::uint32_t pointer_count = 0;
   std::array<protocol::Pointer, protocol::kMaxPointers> pointers{};
 };
+
+inline constexpr std::size_t kFramesKept = 8;
 
 /// A world frame with its bodies.
 struct SeenFrame {
@@ -71,8 +73,8 @@ class PairWatch {
   const std::deque<SeenTick>& ticks() const { return ticks_; }
   /// The newest tick as it was read; no channels before the first.
   const protocol::HapticTick& newest_tick() const { return tick_; }
-  /// sequence 0 before the first.
-  const SeenFrame& frame() const { return frame_; }
+  /// The last kFramesKept, the newest last; those of a world that is gone stay until the next comes.
+  const std::deque<SeenFrame>& frames() const { return frames_; }
   /// revision 0 before the first.
   const protocol::WorldScene& scene() const { return scenes_.scene(); }
 
@@ -81,7 +83,7 @@ class PairWatch {
   void LookForWorld();
   void ReadTicks();
   void ReadFrames();
-  void ReadBodies();
+  void CompleteFrame(std::uint64_t now_ns);
   void AgeFeatures(std::uint64_t first_new);
   std::uint64_t StateTime(const protocol::WorldFrame& frame, std::uint64_t stamp_ns) const;
 
@@ -104,7 +106,9 @@ class PairWatch {
   protocol::MessageReader<protocol::WorldHealth> world_health_reader_;
   protocol::BodiesReader bodies_;
   protocol::SceneReader scenes_;
-  SeenFrame frame_;
+  SeenFrame pending_;  // until its bodies are there; stamp_ns 0: none is
+  std::deque<SeenFrame> frames_;
+  std::uint64_t frame_count_ = 0;
   struct Stamp {
     std::uint64_t frame = 0;
     std::uint64_t stamp_ns = 0;

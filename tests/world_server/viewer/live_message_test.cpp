@@ -62,8 +62,10 @@ Update Decoded(const std::string& message) {
   std::memcpy(update.numbers.data(), rest.data(), rest.size());
   update.stride =
       kTickNumbers + update.head["ticks"]["pointers"].get<std::size_t>() * kPointerNumbers;
-  CHECK(update.numbers.size() == update.head["ticks"]["count"].get<std::size_t>() * update.stride +
-                                     update.head["bodies"].get<std::size_t>() * kBodyNumbers);
+  std::size_t bodies = 0;
+  for (const json& frame : update.head["frames"]) bodies += frame["bodies"].get<std::size_t>();
+  CHECK(update.numbers.size() ==
+        update.head["ticks"]["count"].get<std::size_t>() * update.stride + bodies * kBodyNumbers);
   return update;
 }
 
@@ -121,7 +123,9 @@ TEST_CASE("an update holds the ticks since the one before, each once, and a fram
     CHECK(pointer[3 + axis] == newest.pointers[1].position[axis]);
     CHECK(pointer[6 + axis] == newest.pointers[1].force[axis]);
   }
-  REQUIRE(first.head["bodies"] == 2);
+  REQUIRE(first.head["frames"].size() == 1);
+  const json& told_frame = first.head["frames"][0];
+  REQUIRE(told_frame["bodies"] == 2);
   const double* body = first.numbers.data() + 5 * first.stride + kBodyNumbers;
   CHECK(body[0] == placed[1].body);
   CHECK(body[1] == placed[1].generation);
@@ -130,10 +134,10 @@ TEST_CASE("an update holds the ticks since the one before, each once, and a fram
     CHECK(body[9 + axis] == placed[1].velocity[axis]);
   }
   // The frame's poses are of the end of the tick that it acknowledges.
-  CHECK(first.head["frame"]["state_ns"] == frame_stamp - 1'000'000);
-  CHECK(first.head["frame"]["number"] == 7);
-  CHECK(first.head["frame"]["planes"].size() == frame.plane_count);
-  CHECK(first.head["frame"]["copies"].size() == frame.local_body_count);
+  CHECK(told_frame["state_ns"] == frame_stamp - 1'000'000);
+  CHECK(told_frame["number"] == 7);
+  CHECK(told_frame["planes"].size() == frame.plane_count);
+  CHECK(told_frame["copies"].size() == frame.local_body_count);
   CHECK(first.head["contacts"].size() == newest.channel_count);
 
   publish(6);
@@ -141,11 +145,47 @@ TEST_CASE("an update holds the ticks since the one before, each once, and a fram
   const Update second = Decoded(UpdateMessage(*pair.watch, pair.now_ns, told));
   CHECK(second.head["ticks"]["count"] == 1);
   CHECK(second.numbers[1] == 6);
-  CHECK(second.head["bodies"] == 0);
-  CHECK_FALSE(second.head.contains("frame"));
+  CHECK(second.head["frames"].empty());
   // Another browser is told on its own.
   Told other;
   CHECK(Decoded(UpdateMessage(*pair.watch, pair.now_ns, other)).head["ticks"]["count"] == 6);
+}
+
+TEST_CASE("frames come in order, each once; after a pause the last, as many as are kept") {
+  Watched pair;
+  pair.StartWorld();
+  auto frames = pair.world->Writer<WorldFrame>();
+  BodiesWriter bodies(pair.world->Stream(StreamType::kWorldBodies));
+  test::Generator random(4);
+  WorldFrame frame = random.Frame();
+  std::vector<Body> placed{random.OneBody()};
+  const auto publish = [&](std::uint64_t number) {
+    frame.frame = number;
+    placed[0].position = {static_cast<double>(number), 0, 0};
+    const std::uint64_t stamp_ns = Now();
+    REQUIRE(frames.Publish(frame, stamp_ns));
+    REQUIRE(bodies.Publish(placed, stamp_ns));
+    pair.Poll();
+  };
+  Told told;
+  const auto numbers = [&] {
+    const Update update = Decoded(UpdateMessage(*pair.watch, pair.now_ns, told));
+    std::vector<std::uint64_t> found;
+    for (std::size_t i = 0; i < update.head["frames"].size(); ++i) {
+      found.push_back(update.head["frames"][i]["number"]);
+      CHECK(update.numbers[i * kBodyNumbers + 2] == static_cast<double>(found.back()));
+    }
+    return found;
+  };
+  publish(1);
+  CHECK(numbers() == std::vector<std::uint64_t>{1});
+  publish(2);
+  publish(3);
+  CHECK(numbers() == std::vector<std::uint64_t>{2, 3});
+  CHECK(numbers().empty());
+  for (std::uint64_t number = 4; number < 24; ++number) publish(number);
+  CHECK(numbers() == std::vector<std::uint64_t>{16, 17, 18, 19, 20, 21, 22, 23});
+  CHECK(pair.watch->frames().size() == kFramesKept);
 }
 
 TEST_CASE("a browser that was away is told the newest ticks, not all of them") {

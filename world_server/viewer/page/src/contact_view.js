@@ -131,7 +131,7 @@ export class ContactView {
       const total = new THREE.Vector3(...impulse);
       const grown = total.distanceTo(this.#impulses.get(key) ?? total);
       this.#impulses.set(key, total);
-      if (grown > 1e-4) this.#lit.push({ time, point, size: 0.008 + 0.02 * Math.sqrt(grown) });
+      if (grown > 1e-4) this.#lit.push({ time, point, size: 0.006 + 0.012 * Math.sqrt(grown) });
     }
     while (this.#lit.length > 1000) this.#lit.shift();
   }

@@ -14,21 +14,23 @@ export const BODY = { body: 0, generation: 1, position: 2, orientation: 5, veloc
 
 /**
  * @param {ArrayBuffer} message
- * @return {{head: Object, ticks: Float64Array, stride: number, bodies: Float64Array}} `stride`:
- *     numbers per tick
+ * @return {{head: Object, ticks: Float64Array, stride: number, bodies: !Array<Float64Array>}}
+ *     `stride`: numbers per tick; `bodies` of each of head.frames
  */
 export function decodeUpdate(message) {
   const headBytes = new DataView(message).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, headBytes)));
   const stride = TICK_NUMBERS + head.ticks.pointers * POINTER_NUMBERS;
   const tickNumbers = head.ticks.count * stride;
-  const begin = 4 + headBytes;
-  return {
-    head,
-    stride,
-    ticks: new Float64Array(message, begin, tickNumbers),
-    bodies: new Float64Array(message, begin + 8 * tickNumbers, head.bodies * BODY_NUMBERS),
+  let at = 4 + headBytes;
+  const take = (numbers) => {
+    const taken = new Float64Array(message, at, numbers);
+    at += taken.byteLength;
+    return taken;
   };
+  const ticks = take(tickNumbers);
+  const bodies = head.frames.map((frame) => take(frame.bodies * BODY_NUMBERS));
+  return { head, stride, ticks, bodies };
 }
 
 /** The number by which pages know a body: number and generation in one. */

@@ -83,11 +83,11 @@ export class Frames {
     this.bytes = 0;
   }
 
-  append(head, bodies) {
+  append(epoch, told, bodies) {
     const last = this.list.at(-1);
-    const { number, stamp_ns, state_ns, period_ns, planes, copies } = head.frame;
+    const { number, stamp_ns, state_ns, period_ns, planes, copies } = told;
     const frame = {
-      epoch: head.world.epoch,
+      epoch,
       number,
       stamp: stamp_ns,
       state: last ? Math.max(state_ns, last.state + 1) : state_ns,

@@ -83,10 +83,8 @@ connect({
     head = update.head;
     clock.hear(head.now_ns);
     ticks.append(update.ticks, update.stride, norm(head.haptic.displayed), norm(head.haptic.received));
-    if (head.frame) {
-      const frame = frames.append(head, update.bodies);
-      contactView.hearImpulses(head.contacts, frame.state);
-    }
+    head.frames.forEach((told, i) => frames.append(head.world.epoch, told, update.bodies[i]));
+    if (head.frames.length > 0) contactView.hearImpulses(head.contacts, frames.list.at(-1).state);
   },
 });
 
@@ -95,7 +93,7 @@ let measured = 0;
 function measurePenetration(last) {
   for (measured = Math.max(measured, ticks.first); measured <= last; ++measured) {
     const moment = bracket(frames, ticks.at(measured, TICK.start), true);
-    if (!moment) continue;
+    if (!moment?.b) continue; // where the bodies were then is not known
     const planes = planesAt(moment);
     let deepest = 0;
     for (const { pointer, radius, position } of pointersOf(ticks, measured)) {
@@ -255,13 +253,14 @@ window.rikiseki = {
     banner: byId("banner").hidden ? "" : byId("banner").textContent,
     complaint: byId("complaint").textContent,
   }),
-  /** Where a body was along x over all remembered frames, every `step` ns, interpolated or raw. */
+  /** A body along x over all remembered frames, every `step` ns, interpolated or raw: [frame before, x]. */
   sweep: (place, interpolate, step) => {
     const key = [...sceneView.bodies.keys()][place];
     const at = new THREE.Vector3();
     const way = [];
     for (let time = oldest(); time <= frames.list.at(-1).state; time += step) {
-      if (poseAt(bracket(frames, time, interpolate), key, at, new THREE.Quaternion())) way.push(at.x);
+      const moment = bracket(frames, time, interpolate);
+      if (poseAt(moment, key, at, new THREE.Quaternion())) way.push([moment.a.number, at.x]);
     }
     return way;
   },
