@@ -159,6 +159,13 @@ class LabPc:
         assert not check or done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
         return done
 
+    def may(self, capability):
+        """Whether anybody on the booted machine can have this capability."""
+        number = {"CAP_IPC_LOCK": 14, "CAP_SYS_NICE": 23}[capability]
+        lines = pathlib.Path(f"/proc/{self.leader}/status").read_text().splitlines()
+        (bounding,) = [line.split()[1] for line in lines if line.startswith("CapBnd")]
+        return int(bounding, 16) >> number & 1 == 1
+
     def state(self):
         return self.run("systemctl", "is-system-running", check=False).stdout.strip()
 
