@@ -1,6 +1,7 @@
 // Reads the scene again beside the running loop - when it is asked to, and when one of the files that
 // the scene was read from has changed - and puts it in the running one's place between two ticks.
-// Reading takes many ticks and happens in a thread of its own, which does nothing else.
+// Reading takes many ticks, and so does letting the engine find what carries what in a large scene: both
+// happen in a thread of its own, which does nothing else.
 #pragma once
 
 #include <condition_variable>
@@ -51,14 +52,16 @@ class SceneReload {
   std::optional<ReloadReport> Poll(WorldStep& step);
 
  private:
+  // What was read, or why it was refused.
   struct Result {
-    Replacement how = Replacement::kChange;
-    std::optional<ReadyScene> ready;
+    std::optional<Successor> successor;
+    std::vector<std::string> warnings;
     std::string refused;
   };
 
   void Work();
   Result Read(Replacement how);
+  bool IsNews(Result& result, std::unique_lock<std::mutex>& lock);
 
   Settings settings_;  // of the thread alone
   FileWatch watch_;    // likewise
@@ -67,6 +70,8 @@ class SceneReload {
   std::condition_variable wake_;
   bool stop_ = false;                   // under the mutex, as what follows
   std::optional<std::string> restart_;  // the scene that was asked for
+  bool wants_moment_ = false;           // of the running scene
+  std::optional<Moment> moment_;        // as wanted
   std::optional<Result> result_;        // not yet taken
   std::thread thread_;
 };
