@@ -16,6 +16,7 @@
 namespace rikiseki::test {
 
 void UsbFs::ShowReadiness() {
+  if (slave_ < 0) return;
   const bool busy = done_.empty() && plugged_;
   if (busy == shown_busy_) return;
   tcflow(slave_, busy ? TCOOFF : TCOON);
@@ -75,6 +76,12 @@ void UsbFs::Control(const Urb& urb) {
   Finish(urb, -EPIPE, 0);
 }
 
+void UsbFs::OnConnected(UMockdevIoctlBase*, UMockdevIoctlClient*, gpointer self) {
+  auto* usb = static_cast<UsbFs*>(self);
+  const std::lock_guard lock(usb->mutex_);
+  ++usb->clients_;
+}
+
 gboolean UsbFs::OnIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
   auto* usb = static_cast<UsbFs*>(self);
   const std::lock_guard lock(usb->mutex_);
@@ -91,6 +98,7 @@ void UsbFs::Forget(const Urb& urb) {
 void UsbFs::OnVanished(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
   auto* usb = static_cast<UsbFs*>(self);
   const std::lock_guard lock(usb->mutex_);
+  --usb->clients_;
   for (auto* queue : {&usb->in_, &usb->out_, &usb->done_}) {
     const auto end = std::stable_partition(queue->begin(), queue->end(),
                                            [&](const Urb& urb) { return urb.client != client; });

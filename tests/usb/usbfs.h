@@ -72,6 +72,7 @@ class UsbFs {
     std::vector<std::uint8_t> bytes;
   };
 
+  static void OnConnected(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static gboolean OnIoctl(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static void OnVanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static void Forget(const Urb& urb);
@@ -85,6 +86,7 @@ class UsbFs {
   void ShowReadiness();
   std::string Path(const std::string& relative) const;
   void MakeNode(bool with_permission);
+  bool HasClients();
 
   UMockdevTestbed* testbed_;
   std::mutex& mutex_;
@@ -100,6 +102,7 @@ class UsbFs {
   std::string terminal_;
   bool shown_busy_ = false;
   bool plugged_ = false;
+  int clients_ = 0;       // that have the node open
   std::deque<Urb> in_;    // that wait for a reply
   std::deque<Urb> out_;   // that wait for the bus to move
   std::deque<Urb> done_;  // to be reaped

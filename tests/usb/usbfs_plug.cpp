@@ -8,11 +8,13 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
 #include "tests/usb/usbfs.h"
 
@@ -20,6 +22,7 @@ namespace rikiseki::test {
 namespace {
 
 constexpr char kHub[] = "usb1";
+constexpr int kPatienceMs = 10'000;  // with a busy machine
 
 std::uint8_t Low(std::uint16_t word) {
   return static_cast<std::uint8_t>(word);
@@ -65,6 +68,7 @@ UsbFs::UsbFs(UMockdevTestbed* testbed, std::mutex& mutex, const Identity& identi
       node_("/dev/bus/usb/001/" + Three(identity.number)),
       descriptors_(Descriptors(identity.vendor, identity.product)) {
   handler_ = umockdev_ioctl_base_new();
+  g_signal_connect(handler_, "client-connected", G_CALLBACK(OnConnected), this);
   g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(OnIoctl), this);
   g_signal_connect(handler_, "client-vanished", G_CALLBACK(OnVanished), this);
 }
@@ -158,13 +162,25 @@ void UsbFs::Unplug() {
   // The host reaps what failed first, then sees the node end.
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   umockdev_testbed_uevent(testbed_, sysfs_, "remove");
-  umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
-  close(master_);
-  close(slave_);
   umockdev_testbed_remove_device(testbed_, sysfs_);
   std::filesystem::remove(Path(node_));
   g_free(sysfs_);
   sysfs_ = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    close(std::exchange(master_, -1));
+    close(std::exchange(slave_, -1));
+  }
+  // umockdev ends a host whose call it cuts short: those who have the node open, learn of it first.
+  for (int i = 0; i < kPatienceMs && HasClients(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
+}
+
+bool UsbFs::HasClients() {
+  const std::lock_guard lock(mutex_);
+  return clients_ > 0;
 }
 
 }  // namespace rikiseki::test
