@@ -76,15 +76,10 @@ void UsbFs::Control(const Urb& urb) {
   Finish(urb, -EPIPE, 0);
 }
 
-void UsbFs::OnConnected(UMockdevIoctlBase*, UMockdevIoctlClient*, gpointer self) {
-  auto* usb = static_cast<UsbFs*>(self);
-  const std::lock_guard lock(usb->mutex_);
-  ++usb->clients_;
-}
-
 gboolean UsbFs::OnIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
   auto* usb = static_cast<UsbFs*>(self);
   const std::lock_guard lock(usb->mutex_);
+  usb->called_ns_ = MonotonicNow();
   usb->Ioctl(client);
   return TRUE;
 }
@@ -98,7 +93,6 @@ void UsbFs::Forget(const Urb& urb) {
 void UsbFs::OnVanished(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
   auto* usb = static_cast<UsbFs*>(self);
   const std::lock_guard lock(usb->mutex_);
-  --usb->clients_;
   for (auto* queue : {&usb->in_, &usb->out_, &usb->done_}) {
     const auto end = std::stable_partition(queue->begin(), queue->end(),
                                            [&](const Urb& urb) { return urb.client != client; });

@@ -72,7 +72,6 @@ class UsbFs {
     std::vector<std::uint8_t> bytes;
   };
 
-  static void OnConnected(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static gboolean OnIoctl(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static void OnVanished(UMockdevIoctlBase* base, UMockdevIoctlClient* client, gpointer self);
   static void Forget(const Urb& urb);
@@ -86,7 +85,7 @@ class UsbFs {
   void ShowReadiness();
   std::string Path(const std::string& relative) const;
   void MakeNode(bool with_permission);
-  bool HasClients();
+  bool IsQuiet();
 
   UMockdevTestbed* testbed_;
   std::mutex& mutex_;
@@ -102,10 +101,10 @@ class UsbFs {
   std::string terminal_;
   bool shown_busy_ = false;
   bool plugged_ = false;
-  int clients_ = 0;       // that have the node open
-  std::deque<Urb> in_;    // that wait for a reply
-  std::deque<Urb> out_;   // that wait for the bus to move
-  std::deque<Urb> done_;  // to be reaped
+  std::int64_t called_ns_ = 0;  // the last ioctl
+  std::deque<Urb> in_;          // that wait for a reply
+  std::deque<Urb> out_;         // that wait for the bus to move
+  std::deque<Urb> done_;        // to be reaped
   std::deque<Reply> replies_;
 };
 

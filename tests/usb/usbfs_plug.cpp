@@ -16,13 +16,15 @@
 #include <thread>
 #include <utility>
 
+#include "common/clock.h"
 #include "tests/usb/usbfs.h"
 
 namespace rikiseki::test {
 namespace {
 
 constexpr char kHub[] = "usb1";
-constexpr int kPatienceMs = 10'000;  // with a busy machine
+constexpr std::int64_t kQuietNs = 300'000'000;
+constexpr int kPatienceMs = 10'000;
 
 std::uint8_t Low(std::uint16_t word) {
   return static_cast<std::uint8_t>(word);
@@ -68,7 +70,6 @@ UsbFs::UsbFs(UMockdevTestbed* testbed, std::mutex& mutex, const Identity& identi
       node_("/dev/bus/usb/001/" + Three(identity.number)),
       descriptors_(Descriptors(identity.vendor, identity.product)) {
   handler_ = umockdev_ioctl_base_new();
-  g_signal_connect(handler_, "client-connected", G_CALLBACK(OnConnected), this);
   g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(OnIoctl), this);
   g_signal_connect(handler_, "client-vanished", G_CALLBACK(OnVanished), this);
 }
@@ -171,16 +172,16 @@ void UsbFs::Unplug() {
     close(std::exchange(master_, -1));
     close(std::exchange(slave_, -1));
   }
-  // umockdev ends a host whose call it cuts short: those who have the node open, learn of it first.
-  for (int i = 0; i < kPatienceMs && HasClients(); ++i) {
+  // umockdev ends a host whose call it cuts short: who has the node open, learns of its end first.
+  for (int i = 0; i < kPatienceMs && !IsQuiet(); ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
 }
 
-bool UsbFs::HasClients() {
+bool UsbFs::IsQuiet() {
   const std::lock_guard lock(mutex_);
-  return clients_ > 0;
+  return MonotonicNow() - called_ns_ > kQuietNs;
 }
 
 }  // namespace rikiseki::test
