@@ -145,19 +145,19 @@ Vec3 Hand::Friction(const Vec3& force, const Vec3& program_velocity) const noexc
   return -sliding * (impedance_.friction_n / (to_stop * step_.vf));
 }
 
-void Hand::Advance(std::int64_t dt_ns, const Vec3& applied) noexcept {
+void Hand::Advance(std::int64_t dt_ns, const Vec3& force) noexcept {
   if (dt_ns != step_ns_) {
     step_ns_ = dt_ns;
     step_ = ExactStep(impedance_, Seconds(dt_ns));
   }
   now_ns_ += dt_ns;
   const Vec3 target = program_(Seconds(now_ns_));
-  Vec3 force = applied;
+  Vec3 acting = force;
   if (impedance_.friction_n > 0 && dt_ns > 0) {
-    force += Friction(applied, (target - target_) / Seconds(dt_ns));
+    acting += Friction(force, (target - target_) / Seconds(dt_ns));
   }
-  const Vec3 yielding = step_.yy * yielding_ + step_.yv * velocity_ + step_.yf * force;
-  velocity_ = step_.vy * yielding_ + step_.vv * velocity_ + step_.vf * force;
+  const Vec3 yielding = step_.yy * yielding_ + step_.yv * velocity_ + step_.yf * acting;
+  velocity_ = step_.vy * yielding_ + step_.vv * velocity_ + step_.vf * acting;
   yielding_ = yielding;
   target_ = target;
 }

@@ -99,9 +99,6 @@ int RunGuided(Procedure procedure, const Settings& settings, OperatorPanel& pane
     }
   }
   const std::string memory_refusal = LockMemory();
-  if (!memory_refusal.empty() && settings.loop.realtime == RealtimePolicy::kEnforce) {
-    throw StartError(kExitConfig, "loop.realtime = enforce, but " + memory_refusal);
-  }
   std::printf("%s. Space or enter stops at once, as does Ctrl-C.\n", board.Name().c_str());
   std::atomic<bool> stop{false};
   std::atomic<bool> ended{false};
@@ -113,6 +110,14 @@ int RunGuided(Procedure procedure, const Settings& settings, OperatorPanel& pane
                             Loop(*task, settings.period_ns(), panel, stop);
                             ended = true;
                           });
+    for (const std::string& refusal : {thread.obtained().refusal, memory_refusal}) {
+      if (refusal.empty()) continue;
+      if (settings.loop.realtime == RealtimePolicy::kEnforce) {
+        stop = true;
+        throw StartError(kExitConfig, "loop.realtime = enforce, but " + refusal);
+      }
+      std::fprintf(stderr, "not real-time: %s\n", refusal.c_str());
+    }
     was_left_alone = Guide(*task, device.get(), board, ended);
     stop = true;
   }

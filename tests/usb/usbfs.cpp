@@ -16,6 +16,7 @@
 namespace rikiseki::test {
 
 void UsbFs::ShowReadiness() {
+  if (slave_ < 0) return;
   const bool busy = done_.empty() && plugged_;
   if (busy == shown_busy_) return;
   tcflow(slave_, busy ? TCOOFF : TCOON);
@@ -78,6 +79,7 @@ void UsbFs::Control(const Urb& urb) {
 gboolean UsbFs::OnIoctl(UMockdevIoctlBase*, UMockdevIoctlClient* client, gpointer self) {
   auto* usb = static_cast<UsbFs*>(self);
   const std::lock_guard lock(usb->mutex_);
+  usb->called_ns_ = MonotonicNow();
   usb->Ioctl(client);
   return TRUE;
 }

@@ -85,6 +85,7 @@ class UsbFs {
   void ShowReadiness();
   std::string Path(const std::string& relative) const;
   void MakeNode(bool with_permission);
+  bool IsQuiet();
 
   UMockdevTestbed* testbed_;
   std::mutex& mutex_;
@@ -100,9 +101,10 @@ class UsbFs {
   std::string terminal_;
   bool shown_busy_ = false;
   bool plugged_ = false;
-  std::deque<Urb> in_;    // that wait for a reply
-  std::deque<Urb> out_;   // that wait for the bus to move
-  std::deque<Urb> done_;  // to be reaped
+  std::int64_t called_ns_ = 0;  // the last ioctl
+  std::deque<Urb> in_;          // that wait for a reply
+  std::deque<Urb> out_;         // that wait for the bus to move
+  std::deque<Urb> done_;        // to be reaped
   std::deque<Reply> replies_;
 };
 

@@ -8,18 +8,23 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <thread>
+#include <utility>
 
+#include "common/clock.h"
 #include "tests/usb/usbfs.h"
 
 namespace rikiseki::test {
 namespace {
 
 constexpr char kHub[] = "usb1";
+constexpr std::int64_t kQuietNs = 300'000'000;
+constexpr int kPatienceMs = 10'000;
 
 std::uint8_t Low(std::uint16_t word) {
   return static_cast<std::uint8_t>(word);
@@ -158,13 +163,25 @@ void UsbFs::Unplug() {
   // The host reaps what failed first, then sees the node end.
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   umockdev_testbed_uevent(testbed_, sysfs_, "remove");
-  umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
-  close(master_);
-  close(slave_);
   umockdev_testbed_remove_device(testbed_, sysfs_);
   std::filesystem::remove(Path(node_));
   g_free(sysfs_);
   sysfs_ = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    close(std::exchange(master_, -1));
+    close(std::exchange(slave_, -1));
+  }
+  // umockdev ends a host whose call it cuts short: who has the node open, learns of its end first.
+  for (int i = 0; i < kPatienceMs && !IsQuiet(); ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  umockdev_testbed_detach_ioctl(testbed_, node_.c_str(), nullptr);
+}
+
+bool UsbFs::IsQuiet() {
+  const std::lock_guard lock(mutex_);
+  return MonotonicNow() - called_ns_ > kQuietNs;
 }
 
 }  // namespace rikiseki::test
