@@ -242,7 +242,7 @@ double BulletWorld::Engine::PushedSpeed(const PlacedImpulse& push) const {
   const std::size_t place = bodies.moving_of[push.body];
   if (place == BulletBodies::kFixed) return 0;
   const MovingBody& body = bodies.moving[place];
-  const Kick kick = KickOf(push, body.State().pose.position);
+  const Kick kick = KickOn(push);
   return AddedSpeed(body, kick.impulse, kick.angular_impulse);
 }
 
