@@ -1,9 +1,9 @@
 // Who could meet whom within a short window of time. Bodies that could are one group; groups know nothing
 // of each other until the window has passed, so that each may be stepped alone and in its own steps.
 //
-// A body reaches as far as twice its speed carries it, pushes of the window included; whom it may hit, as
-// far as is left of that after the gap. Two meet if their reaches do. A sleeping island within reach is part
-// of the group, asleep. All follows from numbers and places, never from addresses.
+// A body reaches as far as twice its speed carries it, pushes of the window included; whom it may hit,
+// as far as is left of that after the gap. Two meet if their reaches do. A sleeping island within reach
+// is part of the group, asleep. All follows from numbers and places, never from addresses.
 #pragma once
 
 #include <cstddef>

@@ -17,6 +17,8 @@ class CaptureStandardError {
   CaptureStandardError(const CaptureStandardError&) = delete;
   CaptureStandardError& operator=(const CaptureStandardError&) = delete;
 
+  bool empty() const { return text_.view().empty(); }
+
   /// What libsdformat said at this level ("Error" or "Warning"), one entry for each message.
   std::vector<std::string> Messages(const std::string& level) const;
 

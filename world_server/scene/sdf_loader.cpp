@@ -18,9 +18,19 @@
 #include "world_server/scene/sdf_mesh.h"
 #include "world_server/scene/sdf_surface.h"
 #include "world_server/scene/sdf_survey.h"
+#include "world_server/scene/sdf_trimmed.h"
 
 namespace rikiseki::world {
 namespace {
+
+// False where there is anything to say.
+bool LoadQuietly(const std::string& path, const sdf::ParserConfig& config, sdf::Root& root) {
+  const CaptureStandardError captured;
+  sdf::Root quiet;
+  if (!LoadTrimmed(path, config, quiet) || !captured.empty()) return false;
+  root = std::move(quiet);
+  return true;
+}
 
 // The engine knows one friction and one restitution for a body that moves.
 void RequireSameSurface(const sdf::Collision& collision, const std::string& link,
@@ -224,7 +234,7 @@ class Loader {
 
 // The files that an element and all in it were read from.
 void AddFiles(const sdf::ElementPtr& element, std::set<std::string>& files) {
-  if (std::filesystem::is_regular_file(element->FilePath())) files.insert(element->FilePath());
+  files.insert(element->FilePath());
   for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
     AddFiles(child, files);
   }
@@ -243,7 +253,6 @@ LoadedScene LoadSdf(const std::string& path) {
     const int error = file ? EISDIR : errno;
     throw ConfigError(path + ": the scene cannot be read: " + std::strerror(error));
   }
-  CaptureStandardError captured;
   sdf::ParserConfig config;
   config.SetWarningsPolicy(sdf::EnforcementPolicy::ERR);
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::ERR);
@@ -253,7 +262,9 @@ LoadedScene LoadSdf(const std::string& path) {
   config.SetFindCallback([](const std::string&) { return std::string(); });
 
   sdf::Root root;
-  const sdf::Errors errors = root.Load(path, config);
+  const bool is_loaded = LoadQuietly(path, config, root);
+  CaptureStandardError captured;
+  const sdf::Errors errors = is_loaded ? sdf::Errors() : root.Load(path, config);
   RefuseErrors(path, root, errors, captured.Messages("Error"));
   if (root.WorldCount() != 1) {
     throw ConfigError(path + ": " + std::to_string(root.WorldCount()) +
@@ -279,6 +290,8 @@ LoadedScene LoadSdf(const std::string& path) {
   }
   std::set<std::string> files;
   AddFiles(root.Element(), files);
+  std::erase_if(files,
+                [](const std::string& name) { return !std::filesystem::is_regular_file(name); });
   for (const SceneBody& body : loaded.scene.bodies) {
     for (const Collider& collider : body.colliders) AddMeshFile(collider.shape, files);
   }
