@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <mutex>
 #include <regex>
 #include <sdf/sdf.hh>
 #include <set>
@@ -25,7 +26,8 @@ namespace rikiseki::world {
 namespace {
 
 // libsdformat and the URDF parser behind it write to std::cerr what their error objects do not
-// hold. Collects it, so that a refusal stays one line and still gives the reason.
+// hold. Collects it, so that a refusal stays one line and still gives the reason. There is one
+// std::cerr, so threads that load scenes do it one after the other.
 class CaptureStandardError {
  public:
   CaptureStandardError() : before_(std::cerr.rdbuf(text_.rdbuf())) {}
@@ -48,6 +50,8 @@ class CaptureStandardError {
   }
 
  private:
+  static inline std::mutex only_one_;
+  std::lock_guard<std::mutex> lock_{only_one_};
   std::ostringstream text_;
   std::streambuf* before_;
 };
