@@ -140,8 +140,8 @@ Table Grid(bool quick) {
       append({"local", ""}, 1e-3, world_period_s, "semi_implicit");
     }
     // The haptic rate.
-    for (const double period_s :
-         quick ? std::vector{4e-3, 2e-3} : std::vector{4e-3, 2e-3, 5e-4, 2.5e-4, 1.25e-4}) {
+    for (const double period_s : quick ? std::vector{4e-3, 2e-3, 5e-4, 2.5e-4}
+                                       : std::vector{4e-3, 2e-3, 5e-4, 2.5e-4, 1.25e-4}) {
       for (const double world_period_s : quick ? std::vector{0.1} : std::vector{0.02, 0.1, 0.2}) {
         for (const Method& method : kMain) append(method, period_s, world_period_s);
       }

@@ -191,4 +191,14 @@ TEST_CASE(
   CHECK(Contains(wrong.output, ":2: feature = smell: one of finger friction, "));
 }
 
+TEST_CASE("haptic_lab report and people refuse what they cannot use") {
+  const Ended cases = Run("report --cases rows.csv");
+  CHECK(cases.exit_code == 64);
+  CHECK(Contains(cases.output, "the report has its own rows"));
+  CHECK(Run("report --shard 3/2").exit_code == 64);
+  const Ended nobody = Run("people --out /no/such/folder");
+  CHECK(nobody.exit_code == 78);
+  CHECK(Contains(nobody.output, "/no/such/folder/people.csv: the table cannot be read"));
+}
+
 }  // namespace rikiseki::lab

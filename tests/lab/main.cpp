@@ -18,6 +18,7 @@
 #include "tests/lab/planes.h"
 #include "tests/lab/push_traces.h"
 #include "tests/lab/pushes.h"
+#include "tests/lab/report/report.h"
 #include "tests/lab/scene_cost.h"
 #include "tests/lab/slides.h"
 #include "tests/lab/study.h"
@@ -28,6 +29,10 @@
 namespace rikiseki::lab {
 namespace {
 namespace po = boost::program_options;
+
+// No cases: all of them and a page about them, and the page of an experiment with people.
+constexpr const char* kReport = "report";
+constexpr const char* kPeople = "people";
 
 std::vector<Case> Cases() {
   return {Buzz(),       EngineError(), ErrorVsRuntime(), Extremes(),        Fig6(),
@@ -59,10 +64,14 @@ void PrintHelp(const po::options_description& description) {
             << "Runs both loops in virtual time, row by row of a table.\n\nCases:\n";
   for (const Case& known : Cases())
     std::cout << "  " << known.name << "  " << known.purpose << "\n";
-  std::cout << "\n"
-            << description
-            << "\nExit status: 0; 1 if an expected result or a bar was missed; 64 for a wrong "
-            << "command line; 78 for a\nwrong table.\n";
+  std::cout
+      << "  " << kReport
+      << "  runs what the report needs into the folder --out, goes on where it was stopped, and "
+         "writes its page\n  "
+      << kPeople << "  writes the page of scripts/experiment in the folder --out\n\n"
+      << description
+      << "\nExit status: 0; 1 if an expected result or a bar was missed; 64 for a wrong "
+      << "command line; 78 for a\nwrong table.\n";
 }
 
 // "K/N" with 1 <= K <= N.
@@ -101,8 +110,27 @@ Options Parse(int argc, char** argv) {
   return options;
 }
 
+int RunReport(const Options& options) {
+  if (!options.cases.empty()) {
+    throw StartError(kExitUsage,
+                     "--cases: the report has its own rows; --out DIR is where they go");
+  }
+  const RunnerOptions runner{.folder = options.out.empty() ? "report" : options.out,
+                             .size = options.quick ? "quick" : "full",
+                             .jobs = options.study.jobs,
+                             .shard = options.study.shard,
+                             .shards = options.study.shards,
+                             .seed = options.study.seed};
+  return MakeReport(ReportPlan(options.quick), runner, std::cout) == 0 ? kExitOk : kExitFault;
+}
+
 int Run(int argc, char** argv) {
   const Options options = Parse(argc, argv);
+  if (options.case_name == kReport) return RunReport(options);
+  if (options.case_name == kPeople) {
+    MakePeoplePage(options.out.empty() ? "." : options.out, std::cout);
+    return kExitOk;
+  }
   const std::vector<Case> cases = Cases();
   const auto named = [&](const Case& known) { return known.name == options.case_name; };
   auto study = std::find_if(cases.begin(), cases.end(), named);

@@ -12,7 +12,7 @@
 namespace rikiseki::lab {
 namespace {
 
-constexpr double kDuration = 1.0;  // s
+constexpr double kDuration = 1.5;  // s, by then every block rests or nearly so
 constexpr int kEvery = 5;          // ticks between two points
 
 constexpr Named<protocol::Coupling> kCouplings[] = {{"position", protocol::Coupling::kPosition},

@@ -1,6 +1,7 @@
 // What libsdformat dislikes about a file, as one line with its place.
 #pragma once
 
+#include <mutex>
 #include <sdf/sdf.hh>
 #include <sstream>
 #include <string>
@@ -9,7 +10,8 @@
 namespace rikiseki::world {
 
 /// libsdformat and the URDF parser behind it write to std::cerr what their error objects do not hold.
-/// Collects it while it lives, so that a refusal stays one line and still gives the reason.
+/// Collects it while it lives, so that a refusal stays one line and still gives the reason. There is one
+/// std::cerr, so threads that load scenes do it one after the other.
 class CaptureStandardError {
  public:
   CaptureStandardError();
@@ -23,6 +25,8 @@ class CaptureStandardError {
   std::vector<std::string> Messages(const std::string& level) const;
 
  private:
+  static inline std::mutex only_one_;
+  std::lock_guard<std::mutex> lock_{only_one_};
   std::ostringstream text_;
   std::streambuf* before_;
 };

@@ -2,11 +2,14 @@
 
 #include <unistd.h>
 
+#include <array>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <sstream>
+#include <thread>
+#include <vector>
 
 #include "common/config.h"
 
@@ -398,6 +401,29 @@ TEST_CASE("refusals: one line with file, line, what is wrong and what would be r
       folder.Path("none.sdf") + ": the scene cannot be read: No such file or directory");
   CHECK_THROWS_WITH(LoadSdf(folder.Path("")),
                     folder.Path("") + ": the scene cannot be read: Is a directory");
+}
+
+TEST_CASE("threads that load scenes leave standard error as it was, and their refusals apart") {
+  const Folder folder;
+  std::streambuf* before = std::cerr.rdbuf();
+  std::vector<std::jthread> threads;
+  std::array<int, 4> refused{};
+  for (std::size_t i = 0; i < refused.size(); ++i) {
+    const std::string name = "scene" + std::to_string(i) + ".sdf";
+    threads.emplace_back([&folder, &refused, i, name,
+                          path = folder.Write(name, World("<nonsense" + std::to_string(i)))] {
+      for (int k = 0; k < 20; ++k) {
+        try {
+          LoadSdf(path);
+        } catch (const ConfigError& error) {
+          if (Contains(error.what(), name)) ++refused[i];
+        }
+      }
+    });
+  }
+  threads.clear();
+  CHECK(std::cerr.rdbuf() == before);
+  for (const int count : refused) CHECK(count == 20);
 }
 
 }  // namespace rikiseki::world
