@@ -40,6 +40,9 @@ class ConfigSchema {
   /// Three numbers, each within the range.
   void Vector(const std::string& key, Vec3* target, double low, double high,
               const std::string& doc);
+  /// One number or more on one line, separated by blanks.
+  void Numbers(const std::string& key, std::vector<double>* target, double low, double high,
+               const std::string& doc);
   /// Any number of vectors on one line, separated by commas.
   void Vectors(const std::string& key, std::vector<Vec3>* target, double low, double high,
                const std::string& doc);

@@ -3,9 +3,11 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <array>
 #include <charconv>
 #include <csignal>
 #include <cstdio>
+#include <optional>
 
 #include "common/clock.h"
 #include "common/daemon.h"
@@ -13,7 +15,8 @@
 #include "common/realtime.h"
 #include "common/service_notice.h"
 #include "common/version.h"
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/usb/usb_device.h"
+#include "haptic_server/guided/guided_run.h"
 #include "haptic_server/keyboard.h"
 #include "haptic_server/loop.h"
 #include "haptic_server/open_replay.h"
@@ -78,6 +81,20 @@ bool IsRendering(protocol::ForceReason reason) {
   return reason <= protocol::ForceReason::kSoftStart || reason == protocol::ForceReason::kPassivity;
 }
 
+std::optional<Procedure> ProcedureOf(const DaemonOptions& options) {
+  std::optional<Procedure> chosen;
+  constexpr std::array kProcedures = {Procedure::kCalibrate, Procedure::kIdentify,
+                                      Procedure::kZWidth};
+  for (std::size_t i = 0; i < kProcedures.size(); ++i) {
+    if (options.extra[1 + i].empty()) continue;
+    if (chosen) {
+      throw StartError(kExitUsage, "of --calibrate, --identify and --z-width, one at a time");
+    }
+    chosen = kProcedures[i];
+  }
+  return chosen;
+}
+
 // For `systemctl status`.
 std::string InOneLine(const Settings& settings, const Device& device, const HapticLoop& loop) {
   const protocol::Scheduling& scheduling = loop.scheduling();
@@ -95,6 +112,7 @@ void Supervise(const Settings& settings, const Device& device, HapticLoop& loop,
   protocol::ForceReason logged = protocol::ForceReason::kNoContact;
   HapticLoop::WorldMode mode;
   bool unstable = false;
+  std::string complaint;
   while (true) {
     const int signal = WaitForSignal(kSupervisorPollMs);
     notice.Progress(loop.progress(), MonotonicNow());
@@ -116,13 +134,14 @@ void Supervise(const Settings& settings, const Device& device, HapticLoop& loop,
       unstable = !unstable;
       if (unstable) spdlog::warn("the contact is unstable: lower the stiffness or raise damping");
     }
-    const protocol::ForceReason reason = loop.reason();
-    if (IsRendering(reason) && IsRendering(logged)) continue;
-    if (reason != logged) {
-      spdlog::info("force: {}", protocol::Sentence(reason));
-      const std::string complaint = device.Complaint();
+    // Of a device that answers again, nothing is known to be wrong.
+    if (const std::string now = device.Complaint(); now != complaint) {
+      complaint = now;
       if (!complaint.empty()) spdlog::warn("device: {}", complaint);
     }
+    const protocol::ForceReason reason = loop.reason();
+    if (IsRendering(reason) && IsRendering(logged)) continue;
+    if (reason != logged) spdlog::info("force: {}", protocol::Sentence(reason));
     logged = reason;
   }
 }
@@ -140,14 +159,19 @@ double SelftestSeconds(const std::string& text) {
 
 int Run(int argc, char** argv) {
   CatchOperatorSignals();
-  DaemonOptions options =
-      ParseDaemonOptions(argc, argv, "haptic_server", kPurpose,
-                         {{"device", "simulated|replay", "wins over device.kind"},
-                          {"selftest", "SECONDS",
-                           "says whether this PC holds the loop (default 10 s), and ends", "10"}});
+  DaemonOptions options = ParseDaemonOptions(
+      argc, argv, "haptic_server", kPurpose,
+      {{"device", "simulated|usb|replay", "wins over device.kind"},
+       {"calibrate", "", "finds out where the motors are, and saves it"},
+       {"identify", "",
+        "finds out mass, damping, friction and latency of the device, and saves them"},
+       {"z-width", "", "finds out how stiff a wall the device bears"},
+       {"selftest", "SECONDS", "says whether this PC holds the loop (default 10 s), and ends",
+        "10"}});
   std::vector<std::string> overrides = options.set;
+  const std::optional<Procedure> procedure = ProcedureOf(options);
   if (!options.extra[0].empty()) overrides.push_back("device.kind=" + options.extra[0]);
-  const double selftest_s = SelftestSeconds(options.extra[1]);
+  const double selftest_s = SelftestSeconds(options.extra.back());
   if (selftest_s > 0) {  // of the PC, beside whatever runs, and with no device
     overrides.insert(overrides.end(), {"device.kind=simulated", "loop.realtime=ignore"});
     options.instance = "selftest-" + std::to_string(getpid());
@@ -161,11 +185,19 @@ int Run(int argc, char** argv) {
   }
   if (options.check) {
     std::fputs(description.c_str(), stdout);
+    const std::string board = DescribeBoard(settings);
+    if (!board.empty()) std::printf("# device: %s\n", board.c_str());
+    const std::string stability = LargestStiffnessInWords(settings);
+    if (!stability.empty()) std::printf("# stability: %s\n", stability.c_str());
     return kExitOk;
   }
   BlockSignals();
+  if (procedure && settings.device.kind == DeviceKind::kReplay) {
+    throw StartError(kExitUsage, "a recording cannot be calibrated, identified or measured");
+  }
+  if (procedure) return RunGuided(*procedure, settings, panel);
   const std::unique_ptr<Device> device =
-      settings.device.kind == DeviceKind::kReplay ? OpenReplay(settings) : MakeDevice(settings);
+      settings.device.kind == DeviceKind::kReplay ? OpenReplay(settings) : OpenDevice(settings);
   const auto period_ns = static_cast<std::uint64_t>(settings.period_ns());
   protocol::SegmentOwner owner(
       {.instance = options.instance,

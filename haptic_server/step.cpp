@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <span>
 
@@ -72,9 +73,11 @@ struct HapticStep::State {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
     health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
     const std::string name = device.Name();
-    std::copy_n(name.begin(), std::min(name.size(), health.device.size() - 1),
-                health.device.begin());
+    std::copy_n(name.begin(), std::min(name.size(), device_name.size() - 1), device_name.begin());
+    health.device = device_name;
   }
+
+  void NameDevice() noexcept;
 
   bool TakeSample(DeviceSample measured, bool clutched) noexcept;
   std::span<const BodyShare> Render(const TickTime& time, SafetyInput& input) noexcept;
@@ -105,6 +108,8 @@ struct HapticStep::State {
   std::uint64_t missed_in_a_row = 0;
   std::int64_t bounded_period_ns = 0;  // of the world that health.zero_force_after_ns is about
   Vec3 displayed = Vec3::Zero();       // N, in W
+  std::array<char, 32> device_name{};
+  const char* trouble = "";  // of the device, as health.device says it
   protocol::HapticHealth health;
 };
 
@@ -120,6 +125,17 @@ void HapticStep::State::Tune() noexcept {
   energy.Skip();
   health.slew_limit = settings.safety.slew_limit_n_per_s * mapping.force_in_world();
   bounded_period_ns = -1;
+}
+
+// Puts into health.device what is wrong with the device, or else its name. // RT:
+void HapticStep::State::NameDevice() noexcept {
+  const char* now = device.Trouble();
+  if (now == trouble) return;
+  trouble = now;
+  health.device = device_name;
+  if (*now == '\0') return;
+  health.device.fill('\0');
+  std::strncpy(health.device.data(), now, health.device.size() - 1);
 }
 
 // Puts a measurement into the world. False, and nothing is taken, if it does not lie there. // RT:
@@ -245,6 +261,7 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   SafetyInput input;
   DeviceSample measured;
   input.device_ok = state.device.Read(time.start_ns, measured) == DeviceStatus::kOk;
+  state.NameDevice();
   input.sample_finite =
       input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
   if (input.sample_finite) input.speed = measured.velocity.stableNorm();

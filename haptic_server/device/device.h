@@ -46,6 +46,9 @@ class Device {
 
   /// What is known to be wrong while Read is a fault, for the log; else empty. From any thread.
   virtual std::string Complaint() const { return ""; }
+
+  /// The same in at most 31 characters, for haptic_status; empty: the name stands there. // RT:
+  virtual const char* Trouble() const noexcept { return ""; }
 };
 
 }  // namespace rikiseki::haptic

@@ -32,8 +32,10 @@ class Spidar final : public Device {
   }
   std::string Name() const override;
 
-  /// Names the string that makes Read a fault, counted from 1 as the motors of the device file are.
+  /// The board's own, else the string that makes Read a fault, counted from 1 as the motors of the
+  /// device file are.
   std::string Complaint() const override;
+  const char* Trouble() const noexcept override { return board_->Trouble(); }
 
  private:
   // What Complaint says, for it is asked by another thread than Read.
