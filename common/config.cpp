@@ -11,15 +11,11 @@
 #include <numeric>
 #include <sstream>
 
+#include "common/text.h"
+
 namespace rikiseki {
 namespace po = boost::program_options;
 namespace {
-
-std::string Trim(const std::string& text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return "";
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
 
 std::string Show(double value) {
   std::array<char, 32> text{};
@@ -44,11 +40,16 @@ T ParseWhole(const std::string& text, double low, double high) {
   return value;
 }
 
-Vec3 ParseVector(const std::string& text, double low, double high) {
+std::vector<double> ParseNumbers(const std::string& text, double low, double high) {
   std::istringstream words(text);
   std::string word;
   std::vector<double> values;
   while (words >> word) values.push_back(ParseWhole<double>(word, low, high));
+  return values;
+}
+
+Vec3 ParseVector(const std::string& text, double low, double high) {
+  const std::vector<double> values = ParseNumbers(text, low, high);
   if (values.size() != 3) throw std::invalid_argument("not three numbers");
   return {values[0], values[1], values[2]};
 }
@@ -129,6 +130,27 @@ void ConfigSchema::Vector(const std::string& key, Vec3* target, double low, doub
                           const std::string&) { *target = ParseVector(value, low, high); },
             .show = [=] { return Show(*target); },
             .expected = "three numbers `x y z`, each" + RangeText(low, high),
+            .doc = doc});
+}
+
+void ConfigSchema::Numbers(const std::string& key, std::vector<double>* target, double low,
+                           double high, const std::string& doc) {
+  Add(key, {.assign =
+                [=](const std::string& value, const std::string&) {
+                  const std::vector<double> numbers = ParseNumbers(value, low, high);
+                  if (numbers.empty()) throw std::invalid_argument("no number");
+                  *target = numbers;
+                },
+            .show =
+                [=] {
+                  std::string text;
+                  for (const double number : *target) {
+                    if (!text.empty()) text += ' ';
+                    text += Show(number);
+                  }
+                  return text;
+                },
+            .expected = "numbers separated by blanks, each" + RangeText(low, high),
             .doc = doc});
 }
 
@@ -263,6 +285,12 @@ std::string ConfigSchema::Describe() const {
             entry.origin + ")\n";
   }
   return text;
+}
+
+ConfigValues ConfigSchema::Values() const {
+  ConfigValues values;
+  for (const auto& [key, entry] : entries_) values.emplace(key, entry.show());
+  return values;
 }
 
 std::vector<std::string> ConfigSchema::Keys() const {

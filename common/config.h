@@ -22,6 +22,9 @@ class ConfigError : public StartError {
   explicit ConfigError(const std::string& what) : StartError(kExitConfig, what) {}
 };
 
+/// Every key with its effective value in canonical form: equal values are equal texts.
+using ConfigValues = std::map<std::string, std::string>;
+
 /// The keys a program accepts, bound to the variables they set.
 class ConfigSchema {
  public:
@@ -37,6 +40,9 @@ class ConfigSchema {
   /// Three numbers, each within the range.
   void Vector(const std::string& key, Vec3* target, double low, double high,
               const std::string& doc);
+  /// One number or more on one line, separated by blanks.
+  void Numbers(const std::string& key, std::vector<double>* target, double low, double high,
+               const std::string& doc);
   /// Any number of vectors on one line, separated by commas.
   void Vectors(const std::string& key, std::vector<Vec3>* target, double low, double high,
                const std::string& doc);
@@ -71,6 +77,8 @@ class ConfigSchema {
 
   /// Every key with its effective value, where it came from and its sentence, for `--check`.
   std::string Describe() const;
+
+  ConfigValues Values() const;
 
   /// All keys, sorted, for the test that the shipped files document each.
   std::vector<std::string> Keys() const;

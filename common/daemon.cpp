@@ -37,9 +37,15 @@ DaemonOptions ParseDaemonOptions(int argc, char** argv, const std::string& progr
       "check", po::bool_switch(&options.check),
       "validates the settings, prints them and what would run");
   for (std::size_t i = 0; i < extra.size(); ++i) {
-    line.visible.add_options()(extra[i].name.c_str(),
-                               po::value(&options.extra[i])->value_name(extra[i].value_name),
-                               extra[i].doc.c_str());
+    if (extra[i].value_name.empty()) {
+      const auto set = [&options, i](bool is_on) { options.extra[i] = is_on ? "on" : ""; };
+      line.visible.add_options()(extra[i].name.c_str(), po::bool_switch()->notifier(set),
+                                 extra[i].doc.c_str());
+      continue;
+    }
+    auto* const value = po::value(&options.extra[i])->value_name(extra[i].value_name);
+    if (!extra[i].implicit.empty()) value->implicit_value(extra[i].implicit);
+    line.visible.add_options()(extra[i].name.c_str(), value, extra[i].doc.c_str());
   }
   ParseCommandLine(argc, argv, line);
   if (options.config.empty()) throw StartError(kExitUsage, "--config FILE is required; try --help");

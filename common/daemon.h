@@ -15,11 +15,13 @@ struct DaemonOptions {
   std::vector<std::string> extra;  // values of the daemon's own options, in the order declared
 };
 
-/// One option that only this daemon has, e.g. {"device", "simulated|usb|replay"}.
+/// One option that only this daemon has, e.g. {"device", "simulated|usb|replay"}. Without a name for its
+/// value it is a switch, whose value is "on" if it was given.
 struct ExtraOption {
   std::string name;
   std::string value_name;
   std::string doc;
+  std::string implicit = {};  // what the option alone, without a value, means; empty: it needs one
 };
 
 /// Parses the command line. Prints --help and --version itself and exits 0. Throws StartError (64).

@@ -1,5 +1,5 @@
-// Log lines of a daemon: through spdlog to stderr, where journald or a terminal takes them. Never from a
-// real-time tick: spdlog formats, allocates and locks in its caller.
+// Log lines of a daemon: through spdlog to stderr, or to the journal where that is what stderr leads to,
+// with their levels. Never from a real-time tick: spdlog formats, allocates and locks in its caller.
 #pragma once
 
 #include <string>

@@ -56,18 +56,21 @@ bool HapticLoop::IsReleased() noexcept {
 }
 
 void HapticLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) noexcept {
+  const std::uint64_t performed = progress();
   const TickTime time{.start_ns = now_ns,
-                      .previous_duration_ns = performed_ == 0 ? 0 : now_ns - previous_start_ns_,
+                      .previous_duration_ns = performed == 0 ? 0 : now_ns - previous_start_ns_,
                       .missed = missed};
   WorldInput world = ReadWorld();
   if (releasing_) world.ready = false;
+  if (Tuning tuning; tuning_.Take(tuning)) step_.Tune(tuning);
   step_.Tick(time, world, tick_, panel_.Take());
   previous_start_ns_ = now_ns;
   PublishTick();
 
   ++lateness_[HistogramBucket(now_ns - deadline_ns)];
   ++duration_[HistogramBucket(MonotonicNow() - now_ns)];
-  if (performed_++ % health_every_ == 0) PublishHealth();
+  if (performed % health_every_ == 0) PublishHealth();
+  performed_.store(performed + 1, std::memory_order_relaxed);
 }
 
 void HapticLoop::Stop() noexcept {

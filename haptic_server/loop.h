@@ -21,8 +21,12 @@ class HapticLoop {
   HapticLoop(const Settings& settings, HapticStep& step, protocol::SegmentOwner& owner,
              protocol::PeerLink& link, OperatorPanel& panel);
 
+  /// Hands other settings to the running loop; false while it has not taken those before.
+  bool Tune(const Tuning& tuning) noexcept { return tuning_.Offer(tuning); }
+
   /// What the scheduler gave; shown to whoever asks for health.
   void SetScheduling(const protocol::Scheduling& scheduling) { scheduling_ = scheduling; }
+  const protocol::Scheduling& scheduling() const noexcept { return scheduling_; }
 
   /// Ticks until told to stop, then lets the force fade and the device go. // RT:
   void Run(const std::atomic<bool>& stop) noexcept;
@@ -33,8 +37,14 @@ class HapticLoop {
   /// The last tick: the device is let go. // RT:
   void Stop() noexcept;
 
+  /// As it was published last. Not while the loop runs.
+  const protocol::HapticHealth& health() const noexcept { return health_; }
+
   /// Why the force is what it is; for the supervisor, from any thread.
   protocol::ForceReason reason() const noexcept { return reason_.load(std::memory_order_relaxed); }
+
+  /// How many ticks were performed: a loop that hangs stands still here. Likewise.
+  std::uint64_t progress() const noexcept { return performed_.load(std::memory_order_relaxed); }
 
   /// Whether the present contact is unstable; likewise.
   bool unstable() const noexcept { return unstable_.load(std::memory_order_relaxed); }
@@ -62,6 +72,7 @@ class HapticLoop {
   protocol::SegmentOwner& owner_;
   protocol::PeerLink& link_;
   OperatorPanel& panel_;
+  TuningSlot tuning_;
 
   protocol::MessageWriter<protocol::HapticTick> ticks_;
   protocol::MessageWriter<protocol::HapticHealth> healths_;
@@ -78,7 +89,7 @@ class HapticLoop {
   std::atomic<protocol::Coupling> coupling_{protocol::Coupling::kImpulse};
   std::atomic<std::uint64_t> world_period_ns_{0};
   std::int64_t previous_start_ns_ = 0;
-  std::uint64_t performed_ = 0;
+  std::atomic<std::uint64_t> performed_{0};  // written by the loop alone
   bool releasing_ = false;
   std::int64_t release_ticks_left_ = 0;
 };

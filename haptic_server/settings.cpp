@@ -84,10 +84,13 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Number("mapping.force_scale", &mapping.force_scale, 1e-3, 1e3,
                 "Newtons at the device per newton in the world.");
 
-  schema.Choice("device.kind", &settings.device.kind, {{"simulated", DeviceKind::kSimulated}},
+  schema.Choice("device.kind", &settings.device.kind,
+                {{"simulated", DeviceKind::kSimulated},
+                 {"usb", DeviceKind::kUsb},
+                 {"replay", DeviceKind::kReplay}},
                 "Which force display to drive.");
   schema.Path("device.file", &settings.device.file,
-              "The file that describes the display, relative to this one.");
+              "The file that describes the display, or that is replayed, relative to this one.");
 
   HandSettings& hand = settings.hand;
   schema.Choice(
@@ -113,8 +116,9 @@ ConfigSchema DaemonSchema(Settings& settings) {
 }
 
 // The keys of a device file.
-ConfigSchema DeviceSchema(SpidarSettings& spidar) {
+ConfigSchema DeviceSchema(SpidarSettings& spidar, UsbSettings& usb) {
   ConfigSchema schema;
+  AddUsbKeys(schema, usb);
   schema.Vectors("spidar.motors_m", &spidar.motors_m, -10, 10,
                  "Where the four strings leave their motors, device axes.");
   schema.Number("spidar.count_length_m", &spidar.count_length_m, 1e-7, 1e-3,
@@ -129,6 +133,10 @@ ConfigSchema DeviceSchema(SpidarSettings& spidar) {
                 "Mass that moves with the grip.");
   schema.Number("spidar.friction_damping_ns_per_m", &spidar.friction_damping_ns_per_m, 0, 100,
                 "Viscous friction of motors and strings.");
+  schema.Number("spidar.friction_n", &spidar.friction_n, 0, 10,
+                "Dry friction of motors and strings, as felt at the grip.");
+  schema.Number("spidar.latency_us", &spidar.latency_us, 0, kLongestLatencyUs,
+                "From a measurement to the force that was computed from it.");
   return schema;
 }
 
@@ -190,27 +198,40 @@ std::int64_t Settings::period_ns() const {
 }
 
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description) {
-  const std::string device_prefix = "spidar.";
+                      std::string* description, ConfigValues* values) {
+  const auto is_of_device = [](const std::string& assignment) {
+    return assignment.starts_with("spidar.") || assignment.starts_with("usb.");
+  };
   Settings settings;
   ConfigSchema daemon = DaemonSchema(settings);
   daemon.Load(path);
   for (const std::string& assignment : set) {
-    if (!assignment.starts_with(device_prefix)) daemon.Set(assignment);
+    if (!is_of_device(assignment)) daemon.Set(assignment);
   }
   if (settings.device.file.empty()) daemon.Refuse("device.file", "the display needs a description");
 
-  ConfigSchema device = DeviceSchema(settings.spidar);
-  device.Load(settings.device.file);
+  const bool described = settings.device.kind != DeviceKind::kReplay;
+  ConfigSchema device = DeviceSchema(settings.spidar, settings.usb);
+  if (described) device.Load(settings.device.file);
   for (const std::string& assignment : set) {
-    if (assignment.starts_with(device_prefix)) device.Set(assignment);
+    if (is_of_device(assignment)) device.Set(assignment);
   }
 
   if (const auto conflict = FindConflict(settings)) daemon.Refuse(conflict->key, conflict->why);
-  if (const auto conflict = FindConflict(settings.spidar)) {
+  if (const auto conflict = FindConflict(settings.spidar); described && conflict) {
     device.Refuse(conflict->key, conflict->why);
   }
+  if (settings.device.kind == DeviceKind::kUsb) {
+    const auto conflict =
+        FindUsbConflict(settings.usb, kTensionStrings, settings.spidar.tension_max_n,
+                        1e-3 * static_cast<double>(settings.period_ns()));
+    if (conflict) device.Refuse(conflict->key, conflict->why);
+  }
   if (description != nullptr) *description = daemon.Describe() + device.Describe();
+  if (values != nullptr) {
+    *values = daemon.Values();
+    values->merge(device.Values());
+  }
   return settings;
 }
 

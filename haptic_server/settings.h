@@ -8,6 +8,7 @@
 #include "common/config.h"
 #include "common/geometry.h"
 #include "common/rigid_body.h"
+#include "haptic_server/device/usb/usb_settings.h"
 
 namespace rikiseki::haptic {
 
@@ -58,11 +59,12 @@ struct MappingSettings {
   double force_scale = 1;            // s_f, newtons at the device per newton in the world
 };
 
-enum class DeviceKind { kSimulated };
+enum class DeviceKind { kSimulated, kUsb, kReplay };
 
 struct DeviceSettings {
   DeviceKind kind = DeviceKind::kSimulated;
-  std::string file;  // motor positions, counts, tension bounds: config/devices/*.ini
+  std::string
+      file;  // motor positions, counts, tension bounds: config/devices/*.ini; or a recording
 };
 
 enum class HandScript { kPush, kStir, kRest };
@@ -84,6 +86,9 @@ struct HandSettings {
   int seed = 1;
 };
 
+/// Longer than this no device file may say that a force takes to come.
+inline constexpr double kLongestLatencyUs = 10'000;
+
 /// Motor positions and electronics of a 4-string SPIDAR. notes of config/devices/*.ini.
 struct SpidarSettings {
   std::vector<Vec3> motors_m;          // in device axes
@@ -93,6 +98,8 @@ struct SpidarSettings {
   double velocity_cutoff_hz = 100;  // of the first-order velocity filter
   double moving_mass_kg = 0.03;
   double friction_damping_ns_per_m = 0.2;
+  double friction_n = 0;  // Coulomb
+  double latency_us = 0;  // from a measurement to the force that was computed from it
 };
 
 struct Settings {
@@ -103,14 +110,16 @@ struct Settings {
   DeviceSettings device;
   HandSettings hand;
   SpidarSettings spidar;
+  UsbSettings usb;
 
   std::int64_t period_ns() const;
 };
 
 /// Reads the daemon's file, the overrides and the device file it names, and checks them against each
-/// other. `description`, if given, receives every key with value and origin. Throws ConfigError.
+/// other. `description`, if given, receives every key with value and origin, `values` those two
+/// alone. Throws ConfigError.
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description = nullptr);
+                      std::string* description = nullptr, ConfigValues* values = nullptr);
 
 /// The checks that involve several keys; throws std::invalid_argument naming them. For settings that
 /// come from code, not from a file.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <span>
 
@@ -65,15 +66,18 @@ struct HapticStep::State {
         ledger(period_ns, HistoryTicks(checked), own_epoch),
         safety(checked),
         energy(checked),
+        tuning(TuningOf(checked), Seconds(period_ns)),
         split({.stiffness_n_per_m = checked.render.stiffness_n_per_m,
                .finger_radius_m = contact.radius()},
               ReplayTicks(checked), own_epoch) {
     health.period_ns = static_cast<std::uint64_t>(period_ns);
     health.slew_limit = checked.safety.slew_limit_n_per_s * mapping.force_in_world();
     const std::string name = device.Name();
-    std::copy_n(name.begin(), std::min(name.size(), health.device.size() - 1),
-                health.device.begin());
+    std::copy_n(name.begin(), std::min(name.size(), device_name.size() - 1), device_name.begin());
+    health.device = device_name;
   }
+
+  void NameDevice() noexcept;
 
   bool TakeSample(DeviceSample measured, bool clutched) noexcept;
   std::span<const BodyShare> Render(const TickTime& time, SafetyInput& input) noexcept;
@@ -82,7 +86,9 @@ struct HapticStep::State {
   void Publish(const TickTime& time, const Vec3& displayed, ForceReason reason,
                protocol::HapticTick& message) noexcept;
 
-  const Settings settings;
+  void Tune() noexcept;
+
+  Settings settings;
   const std::int64_t period_ns;
   Device& device;
   Mapping mapping;
@@ -93,6 +99,7 @@ struct HapticStep::State {
   EmergencyStop emergency_stop;
   SafetyStage safety;
   EnergyMeter energy;
+  TuningRamp tuning;
   SplitEnergy split;
 
   std::uint64_t tick = 0;
@@ -101,8 +108,35 @@ struct HapticStep::State {
   std::uint64_t missed_in_a_row = 0;
   std::int64_t bounded_period_ns = 0;  // of the world that health.zero_force_after_ns is about
   Vec3 displayed = Vec3::Zero();       // N, in W
+  std::array<char, 32> device_name{};
+  const char* trouble = "";  // of the device, as health.device says it
   protocol::HapticHealth health;
 };
+
+// Puts into health.device what is wrong with the device, or else its name. // RT:
+void HapticStep::State::NameDevice() noexcept {
+  const char* now = device.Trouble();
+  if (now == trouble) return;
+  trouble = now;
+  health.device = device_name;
+  if (*now == '\0') return;
+  health.device.fill('\0');
+  std::strncpy(health.device.data(), now, health.device.size() - 1);
+}
+
+// The next step on the way to other settings. What the springs gain by growing stiffer is no leak of the
+// rendering, and the energy meter is not to take it for one. // RT:
+void HapticStep::State::Tune() noexcept {
+  Adopt(tuning.Advance(), settings);
+  contact.Tune(settings.render);
+  safety.Tune(settings.safety);
+  energy.Tune(settings.safety);
+  split.Tune(settings.render.stiffness_n_per_m);
+  device.SetVelocityCutoff(settings.spidar.velocity_cutoff_hz);
+  energy.Skip();
+  health.slew_limit = settings.safety.slew_limit_n_per_s * mapping.force_in_world();
+  bounded_period_ns = -1;
+}
 
 // Puts a measurement into the world. False, and nothing is taken, if it does not lie there. // RT:
 bool HapticStep::State::TakeSample(DeviceSample measured, bool clutched) noexcept {
@@ -223,9 +257,11 @@ HapticStep::~HapticStep() = default;
 void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message,
                       const OperatorInput& wish) noexcept {
   State& state = *state_;
+  if (state.tuning.moves()) state.Tune();
   SafetyInput input;
   DeviceSample measured;
   input.device_ok = state.device.Read(time.start_ns, measured) == DeviceStatus::kOk;
+  state.NameDevice();
   input.sample_finite =
       input.device_ok && IsSound(measured) && state.TakeSample(measured, wish.clutch);
   if (input.sample_finite) input.speed = measured.velocity.stableNorm();
@@ -281,6 +317,10 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
     return state.intake.track().Has(body, generation, kPointer);
   });
   state.Publish(time, displayed, state.safety.reason(), message);
+}
+
+void HapticStep::Tune(const Tuning& target) noexcept {
+  state_->tuning.Start(target);
 }
 
 void HapticStep::Stop(std::int64_t now_ns, protocol::HapticTick& message) noexcept {

@@ -9,6 +9,7 @@
 
 #include "haptic_server/device/device.h"
 #include "haptic_server/settings.h"
+#include "haptic_server/tuning.h"
 #include "haptic_server/world_intake.h"
 #include "protocol/messages.h"
 
@@ -42,6 +43,10 @@ class HapticStep {
   /// Runs one tick and fills the message to publish. // RT: no allocation, lock, log or throw.
   void Tick(const TickTime& time, const WorldInput& world, protocol::HapticTick& message,
             const OperatorInput& wish = {}) noexcept;
+
+  /// From the next tick on, stiffness, damping, caps and filters go to these values over kTuningRampS.
+  /// They must be of settings that CheckSettings accepts. // RT:
+  void Tune(const Tuning& target) noexcept;
 
   /// Zero force and minimum tension at `now_ns`, until when the force of the last tick was held; the
   /// message says kStopped. // RT:

@@ -6,6 +6,7 @@ from the shared segments by haptic_status.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import signal
@@ -16,6 +17,7 @@ import tempfile
 import time
 
 COUPLINGS = ("position", "impulse", "local")  # in the order in which they cure the error
+INSTANCE = f"demo-{os.getpid()}"  # of one pair after the other: a viewer stays with all of them
 NEWTON_SECONDS = 1e-12  # one unit of the impulse totals
 
 
@@ -24,6 +26,7 @@ def parse_arguments():
     parser.add_argument("--coupling", choices=(*COUPLINGS, "compare"), default="compare")
     parser.add_argument("--seconds", type=float, default=60, help="for all couplings together")
     parser.add_argument("--world-rate", type=float, default=20, metavar="HZ")
+    parser.add_argument("--view", action="store_true", help="shows it in the browser, too; prints the address")
     parser.add_argument("--bin", required=True, help=argparse.SUPPRESS)
     parser.add_argument("--config", required=True, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
@@ -36,7 +39,7 @@ class Pair:
     """Both daemons under one instance name, and a stream of status readings from them."""
 
     def __init__(self, arguments, coupling, logs, haptic_config=None):
-        self.instance = f"demo-{os.getpid()}-{coupling}"
+        self.instance = INSTANCE
         self.logs = logs
         self.commands = {
             "world_server": [f"{arguments.bin}/world_server", "--config", f"{arguments.config}/world_server.ini",
@@ -212,6 +215,22 @@ def run(arguments, coupling, seconds, logs, interrupted):
     return trials
 
 
+@contextlib.contextmanager
+def viewer(arguments):
+    """world_viewer beside the pairs, if it is wanted; its address printed."""
+    if not arguments.view:
+        yield
+        return
+    command = [f"{arguments.bin}/world_viewer", "--instance", INSTANCE, "--port", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        print(f"see it at {process.stdout.readline().strip()}", flush=True)
+        yield
+    finally:
+        process.terminate()
+        process.wait()
+
+
 def newton_seconds(units):
     return sum((value * NEWTON_SECONDS) ** 2 for value in units) ** 0.5
 
@@ -259,7 +278,7 @@ def main():
     signal.signal(signal.SIGINT, signal.default_int_handler)  # even where a shell has switched it off
     signal.signal(signal.SIGTERM, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt()))
     all_trials, interrupted = [], [False]
-    with tempfile.TemporaryDirectory(prefix="rikiseki-demo-") as logs:
+    with tempfile.TemporaryDirectory(prefix="rikiseki-demo-") as logs, viewer(arguments):
         for coupling in couplings:
             try:
                 all_trials.append(run(arguments, coupling, arguments.seconds / len(couplings), logs, interrupted))

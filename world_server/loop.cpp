@@ -33,6 +33,10 @@ WorldLoop::WorldLoop(const Settings& settings, WorldStep& step, protocol::Segmen
   loop_health_.scheduling.priority = static_cast<std::uint32_t>(scheduling.priority);
 }
 
+void WorldLoop::Tune(const Settings& settings) {
+  longest_advance_ns_ = static_cast<std::int64_t>(settings.gap_s() * 1e9);
+}
+
 void WorldLoop::Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed) {
   loop_health_.missed += static_cast<std::uint64_t>(missed);
   // Asked before the ledger is drained: who is on offer then has a predecessor that publishes no more.

@@ -19,6 +19,9 @@ class WorldLoop {
   WorldLoop(const Settings& settings, WorldStep& step, protocol::SegmentOwner& owner,
             protocol::PeerLink& link);
 
+  /// Another gap; nothing else is taken.
+  void Tune(const Settings& settings);
+
   /// One world tick at `now_ns`, which was due at `deadline_ns`; `missed` deadlines were skipped since
   /// the tick before.
   void Tick(std::int64_t now_ns, std::int64_t deadline_ns, std::int64_t missed);
@@ -33,7 +36,7 @@ class WorldLoop {
   void TakeNextPeer();
 
   const std::int64_t period_ns_;
-  const std::int64_t longest_advance_ns_;
+  std::int64_t longest_advance_ns_;
   WorldStep& step_;
   protocol::SegmentOwner& owner_;
   protocol::PeerLink& link_;

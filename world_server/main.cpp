@@ -7,8 +7,11 @@
 
 #include "common/clock.h"
 #include "common/daemon.h"
+#include "common/live_settings.h"
 #include "common/logging.h"
+#include "common/service_notice.h"
 #include "common/version.h"
+#include "protocol/words.h"
 #include "world_server/loop.h"
 #include "world_server/scene/needs.h"
 #include "world_server/scene/scene_message.h"
@@ -72,8 +75,54 @@ void Tell(const ReloadReport& report, const WorldStep& step, SceneAnnouncer& ann
   announcer.Publish(step);
 }
 
+// For `systemctl status`.
+std::string InOneLine(const Settings& settings, const WorldStep& step, const WorldLoop& loop) {
+  return fmt::format("{:g} Hz, scene {} with {} bodies; haptic side {}", settings.loop.rate_hz,
+                     step.scene().name, step.scene().bodies.size(),
+                     protocol::Key(loop.peer_state()));
+}
+
+// SIGHUP: the settings and the scene are read again. A wrong file is refused whole.
+class Reload {
+ public:
+  Reload(std::string path, std::vector<std::string> set, const LoopSettings& loop,
+         ConfigValues running, SceneReload& scene)
+      : path_(std::move(path)),
+        set_(std::move(set)),
+        loop_(loop),
+        live_(LiveKeys(), std::move(running)),
+        scene_(scene) {}
+
+  void Again(WorldStep& step, WorldLoop& loop) {
+    ConfigValues read;
+    Settings settings;
+    try {
+      settings = LoadSettings(path_, set_, nullptr, &read);
+    } catch (const ConfigError& error) {
+      spdlog::error("the settings stay as they were: {}", error.what());
+      return;
+    }
+    settings.loop = loop_;
+    step.Tune(settings);
+    loop.Tune(settings);
+    live_.Adopt(read);
+    scene_.Restart(settings.scene.file);
+  }
+
+ private:
+  std::string path_;
+  std::vector<std::string> set_;
+  LoopSettings loop_;  // as the loop runs
+  LiveSettings live_;
+  SceneReload& scene_;
+};
+
 void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
-                     protocol::PeerLink& link, SceneAnnouncer& announcer, SceneReload& reload) {
+                     protocol::PeerLink& link, SceneAnnouncer& announcer, SceneReload& scene,
+                     Reload& reload) {
+  ServiceNotice notice;
+  notice.Ready();
+  std::uint64_t ticks = 0;
   PeriodicSchedule schedule(MonotonicNow(), settings.period_ns());
   std::int64_t missed = 0;
   while (true) {
@@ -82,16 +131,21 @@ void RunUntilStopped(const Settings& settings, WorldStep& step, WorldLoop& loop,
     switch (WaitForSignal(0)) {
       case SIGINT:
       case SIGTERM:
+        notice.Stopping();
         return;
       case SIGHUP:
-        reload.Restart();
+        notice.Reloading();
+        reload.Again(step, loop);
+        notice.Ready();
         break;
       default:
         break;
     }
-    if (const auto report = reload.Poll(step)) Tell(*report, step, announcer);
+    if (const auto report = scene.Poll(step)) Tell(*report, step, announcer);
     loop.Tick(now_ns, schedule.deadline_ns(), missed);
     for (const std::string& line : link.PollNews()) spdlog::info("haptic side: {}", line);
+    notice.Progress(++ticks, now_ns);
+    notice.Status(InOneLine(settings, step, loop), now_ns);
     missed = schedule.Advance(MonotonicNow());
   }
 }
@@ -103,7 +157,8 @@ int Run(int argc, char** argv) {
   std::vector<std::string> overrides = options.set;
   if (!options.extra[0].empty()) overrides.push_back("scene.file=" + options.extra[0]);
   std::string description;
-  const Settings settings = LoadSettings(options.config, overrides, &description);
+  ConfigValues values;
+  const Settings settings = LoadSettings(options.config, overrides, &description, &values);
   StartLogging("world_server");
   ReadyScene ready = LoadScene(settings);
   for (const std::string& warning : ready.loaded.warnings) spdlog::warn("{}", warning);
@@ -139,8 +194,9 @@ int Run(int argc, char** argv) {
                settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
   SceneAnnouncer announcer(owner, UseOf(settings), body_room);
   announcer.Publish(step);
-  SceneReload reload(settings, std::move(ready.loaded.files));
-  RunUntilStopped(settings, step, loop, link, announcer, reload);
+  SceneReload scene_reload(settings, std::move(ready.loaded.files));
+  Reload reload(options.config, overrides, settings.loop, values, scene_reload);
+  RunUntilStopped(settings, step, loop, link, announcer, scene_reload, reload);
   spdlog::info("stopped");
   return kExitOk;
 }

@@ -35,10 +35,10 @@ SceneReload::~SceneReload() {
   thread_.join();
 }
 
-void SceneReload::Restart() {
+void SceneReload::Restart(const std::string& scene_file) {
   {
     const std::lock_guard lock(mutex_);
-    restart_ = true;
+    restart_ = scene_file;
   }
   wake_.notify_one();
 }
@@ -53,28 +53,44 @@ void SceneReload::Work() {
       wake_.wait(lock, asked);
     }
     if (stop_) return;
-    const bool restart = std::exchange(restart_, false);
+    const std::optional<std::string> restart = std::exchange(restart_, std::nullopt);
     lock.unlock();
     std::optional<Result> result;
     if (restart) {
+      settings_.scene.file = *restart;
       watch_.Accept();
       result = Read(Replacement::kRestart);
     } else if (watch_.Look()) {
       result = Read(Replacement::kChange);
     }
     lock.lock();
-    if (!result) continue;
-    // Of a restart that nobody took yet, the wish stays.
-    if (result_ && result_->how == Replacement::kRestart) result->how = Replacement::kRestart;
-    result_ = std::move(result);
+    if (result && IsNews(*result, lock)) result_ = std::move(result);
   }
 }
 
+// Prepares what was read for the running scene's place, as soon as the loop tells how that stands.
+bool SceneReload::IsNews(Result& result, std::unique_lock<std::mutex>& lock) {
+  if (!result.successor) return true;
+  wants_moment_ = true;
+  wake_.wait(lock, [this] { return stop_ || moment_; });
+  if (stop_) return false;
+  const Moment moment = *std::exchange(moment_, std::nullopt);
+  lock.unlock();
+  Successor& successor = *result.successor;
+  const bool is_news = successor.how == Replacement::kRestart || !(successor.scene == moment.scene);
+  if (is_news) Prepare(moment, settings_.physics.substep_ms * 1e-3, successor);
+  lock.lock();
+  return is_news;
+}
+
 SceneReload::Result SceneReload::Read(Replacement how) {
-  Result result{.how = how, .ready = {}, .refused = {}};
+  Result result;
   try {
-    result.ready = LoadScene(settings_);
-    watch_.Watch(result.ready->loaded.files);
+    ReadyScene ready = LoadScene(settings_);
+    watch_.Watch(ready.loaded.files);
+    result.successor = Successor{
+        .scene = std::move(ready.loaded.scene), .dynamics = std::move(ready.dynamics), .how = how};
+    result.warnings = std::move(ready.loaded.warnings);
   } catch (const std::exception& error) {
     result.refused = error.what();
   }
@@ -83,21 +99,28 @@ SceneReload::Result SceneReload::Read(Replacement how) {
 
 std::optional<ReloadReport> SceneReload::Poll(WorldStep& step) {
   std::optional<Result> result;
+  bool wants_moment = false;
   {
     const std::lock_guard lock(mutex_);
     std::swap(result, result_);
+    wants_moment = std::exchange(wants_moment_, false);
   }
-  if (!result) return std::nullopt;
-  ReloadReport report;
-  report.refused = std::move(result->refused);
-  if (!result->ready) return report;
-  ReadyScene& ready = *result->ready;
-  if (result->how == Replacement::kChange && ready.loaded.scene == step.scene()) {
-    return std::nullopt;
+  std::optional<ReloadReport> report;
+  if (result) {
+    report = ReloadReport{.refused = std::move(result->refused),
+                          .warnings = std::move(result->warnings)};
+    report->replaced = result->successor.has_value();
+    if (result->successor) step.Replace(std::move(*result->successor));
   }
-  report.warnings = std::move(ready.loaded.warnings);
-  step.Replace(std::move(ready.loaded.scene), std::move(ready.dynamics), result->how);
-  report.replaced = true;
+  // After the replacement, of which what is being read must know.
+  if (wants_moment) {
+    Moment moment = step.Now();
+    {
+      const std::lock_guard lock(mutex_);
+      moment_ = std::move(moment);
+    }
+    wake_.notify_one();
+  }
   return report;
 }
 

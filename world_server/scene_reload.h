@@ -1,6 +1,7 @@
 // Reads the scene again beside the running loop - when it is asked to, and when one of the files that
 // the scene was read from has changed - and puts it in the running one's place between two ticks.
-// Reading takes many ticks and happens in a thread of its own, which does nothing else.
+// Reading takes many ticks, and so does letting the engine find what carries what in a large scene: both
+// happen in a thread of its own, which does nothing else.
 #pragma once
 
 #include <condition_variable>
@@ -42,32 +43,36 @@ class SceneReload {
   SceneReload(const SceneReload&) = delete;
   SceneReload& operator=(const SceneReload&) = delete;
 
-  /// Reads the scene again, and everything that moves starts anew. A second request while one is
-  /// under way starts another after it.
-  void Restart();
+  /// Reads this scene, and everything that moves starts anew. A second request while one is under way
+  /// starts another after it.
+  void Restart(const std::string& scene_file);
 
   /// Puts what was read since the last call in the place of the running scene; nothing if nothing
   /// was. Files that were changed and say the same as before change nothing and are no news.
   std::optional<ReloadReport> Poll(WorldStep& step);
 
  private:
+  // What was read, or why it was refused.
   struct Result {
-    Replacement how = Replacement::kChange;
-    std::optional<ReadyScene> ready;
+    std::optional<Successor> successor;
+    std::vector<std::string> warnings;
     std::string refused;
   };
 
   void Work();
   Result Read(Replacement how);
+  bool IsNews(Result& result, std::unique_lock<std::mutex>& lock);
 
-  const Settings settings_;
-  FileWatch watch_;  // of the thread alone
+  Settings settings_;  // of the thread alone
+  FileWatch watch_;    // likewise
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  bool stop_ = false;             // under the mutex, as what follows
-  bool restart_ = false;          // asked for
-  std::optional<Result> result_;  // not yet taken
+  bool stop_ = false;                   // under the mutex, as what follows
+  std::optional<std::string> restart_;  // the scene that was asked for
+  bool wants_moment_ = false;           // of the running scene
+  std::optional<Moment> moment_;        // as wanted
+  std::optional<Result> result_;        // not yet taken
   std::thread thread_;
 };
 

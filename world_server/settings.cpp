@@ -47,7 +47,7 @@ double Settings::gap_s() const {
 }
 
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description) {
+                      std::string* description, ConfigValues* values) {
   Settings settings;
   ConfigSchema schema;
   Bind(schema, settings);
@@ -57,7 +57,12 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
     schema.Refuse("scene.file", "the path of an SDFormat world is expected");
   }
   if (description != nullptr) *description = schema.Describe();
+  if (values != nullptr) *values = schema.Values();
   return settings;
+}
+
+std::vector<std::string> LiveKeys() {
+  return {"scene.file", "coupling.force_cap_n", "coupling.gap_ms", "features.radius_mm"};
 }
 
 }  // namespace rikiseki::world

@@ -54,6 +54,9 @@ struct Settings {
 
 /// Reads the daemon's file and the overrides and checks them. Throws ConfigError.
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
-                      std::string* description = nullptr);
+                      std::string* description = nullptr, ConfigValues* values = nullptr);
+
+/// The keys of what the running world takes: WorldStep::Tune, WorldLoop::Tune, and another scene.
+std::vector<std::string> LiveKeys();
 
 }  // namespace rikiseki::world

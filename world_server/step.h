@@ -11,14 +11,9 @@
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/scene/scene.h"
 #include "world_server/settings.h"
+#include "world_server/succession.h"
 
 namespace rikiseki::world {
-
-/// What another scene does to what moves.
-enum class Replacement {
-  kChange,   // what the scene says differently is changed, everything else goes on: see Changed
-  kRestart,  // everything that moves begins anew: see Restarted
-};
 
 class WorldStep {
  public:
@@ -39,10 +34,16 @@ class WorldStep {
   /// pointer, and fills the next frame.
   void Tick(double period_s, protocol::WorldFrame& frame);
 
-  /// Puts another scene in the place of this one, with dynamics that nobody has stepped yet. What is
-  /// the same keeps its name on the wire, what goes on is where it was. The books go on: what is
-  /// pending for a body that is no more is discarded.
-  void Replace(Scene scene, std::unique_ptr<DynamicsWorld> dynamics, Replacement how);
+  /// From the next tick on, another force cap, gap and reach of the features. Nothing else is taken.
+  void Tune(const Settings& settings);
+
+  /// Puts another scene in the place of this one, with dynamics that nobody has stepped but Prepare, which
+  /// is done here if it was not yet. What is the same keeps its name on the wire, what goes on is where
+  /// it was. The books go on: what is pending for a body that is no more is discarded.
+  void Replace(Successor successor);
+
+  /// What a successor is prepared from.
+  Moment Now() const;
 
   const Scene& scene() const;
 

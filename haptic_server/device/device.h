@@ -39,10 +39,16 @@ class Device {
   /// stop. // RT:
   virtual void Release() noexcept = 0;
 
+  /// Another corner [Hz] of the filter behind DeviceSample::velocity, where there is one. // RT:
+  virtual void SetVelocityCutoff(double /*cutoff_hz*/) noexcept {}
+
   virtual std::string Name() const = 0;
 
   /// What is known to be wrong while Read is a fault, for the log; else empty. From any thread.
   virtual std::string Complaint() const { return ""; }
+
+  /// The same in at most 31 characters, for haptic_status; empty: the name stands there. // RT:
+  virtual const char* Trouble() const noexcept { return ""; }
 };
 
 }  // namespace rikiseki::haptic

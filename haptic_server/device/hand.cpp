@@ -130,9 +130,19 @@ ImpedanceStep ExactStep(const Impedance& impedance, double dt_s) noexcept {
 Hand::Hand(Program program, const Impedance& impedance)
     : program_(std::move(program)), impedance_(impedance), target_(program_(0)) {
   if (!(impedance.mass_kg > 0) || !(impedance.damping_ns_per_m >= 0) ||
-      !(impedance.stiffness_n_per_m >= 0)) {
-    throw std::invalid_argument("a hand needs a positive mass, no negative damping or stiffness");
+      !(impedance.stiffness_n_per_m >= 0) || !(impedance.friction_n >= 0)) {
+    throw std::invalid_argument(
+        "a hand needs a positive mass, no negative damping, stiffness or friction");
   }
+}
+
+// What stops the grip within the step, at most the friction that there is: N, on the hand.
+Vec3 Hand::Friction(const Vec3& force, const Vec3& program_velocity) const noexcept {
+  const Vec3 sliding =
+      step_.vy * yielding_ + step_.vv * velocity_ + step_.vf * force + program_velocity;
+  const double to_stop = sliding.norm() / step_.vf;
+  if (to_stop <= impedance_.friction_n) return -sliding / step_.vf;
+  return -sliding * (impedance_.friction_n / (to_stop * step_.vf));
 }
 
 void Hand::Advance(std::int64_t dt_ns, const Vec3& force) noexcept {
@@ -140,11 +150,16 @@ void Hand::Advance(std::int64_t dt_ns, const Vec3& force) noexcept {
     step_ns_ = dt_ns;
     step_ = ExactStep(impedance_, Seconds(dt_ns));
   }
-  const Vec3 yielding = step_.yy * yielding_ + step_.yv * velocity_ + step_.yf * force;
-  velocity_ = step_.vy * yielding_ + step_.vv * velocity_ + step_.vf * force;
-  yielding_ = yielding;
   now_ns_ += dt_ns;
-  target_ = program_(Seconds(now_ns_));
+  const Vec3 target = program_(Seconds(now_ns_));
+  Vec3 acting = force;
+  if (impedance_.friction_n > 0 && dt_ns > 0) {
+    acting += Friction(force, (target - target_) / Seconds(dt_ns));
+  }
+  const Vec3 yielding = step_.yy * yielding_ + step_.yv * velocity_ + step_.yf * acting;
+  velocity_ = step_.vy * yielding_ + step_.vv * velocity_ + step_.vf * acting;
+  yielding_ = yielding;
+  target_ = target;
 }
 
 }  // namespace rikiseki::haptic

@@ -55,14 +55,16 @@ class MotorProgram {
   std::mt19937_64 random_;
 };
 
-/// m y'' + b y' + k y = F on each axis. The device that the hand holds is part of m and b.
+/// m y'' + b y' + k y = F on each axis, with a dry friction against the motion through the frame. The
+/// device that the hand holds is part of m, b and the friction.
 struct Impedance {
   double mass_kg = 1;
   double damping_ns_per_m = 0;
   double stiffness_n_per_m = 0;
+  double friction_n = 0;
 };
 
-/// The exact step of an Impedance over `dt_s` under a held force:
+/// The exact step of an Impedance without its dry friction over `dt_s` under a held force:
 /// y' = yy y + yv v + yf F, v' = vy y + vv v + vf F.
 struct ImpedanceStep {
   double yy = 1, yv = 0, yf = 0;
@@ -76,7 +78,7 @@ class Hand {
   using Program = std::function<Vec3(double t_s)>;
 
   /// Starts at time 0 at rest on the program. Throws std::invalid_argument unless the mass is
-  /// positive and damping and stiffness are not negative.
+  /// positive and the rest is not negative.
   Hand(Program program, const Impedance& impedance);
 
   /// Moves on by `dt_ns` under `force` [N, on the hand], held for that time. // RT:
@@ -88,6 +90,8 @@ class Hand {
   const Vec3& yielding_velocity() const noexcept { return velocity_; }  // m/s, y'
 
  private:
+  Vec3 Friction(const Vec3& force, const Vec3& program_velocity) const noexcept;
+
   Program program_;
   Impedance impedance_;
   std::int64_t now_ns_ = 0;

@@ -42,6 +42,14 @@ Vec3 Mapping::VelocityInWorld(const Vec3& velocity) const noexcept {
   return motion_scale_ * (rotated_ ? Vec3(rotation_ * velocity) : velocity);
 }
 
+Vec3 Mapping::PointOnDevice(const Vec3& point) const noexcept {
+  return VelocityOnDevice(moved_ ? Vec3(point - origin_) : point);
+}
+
+Vec3 Mapping::VelocityOnDevice(const Vec3& velocity) const noexcept {
+  return (rotated_ ? Vec3(rotation_.transpose() * velocity) : velocity) / motion_scale_;
+}
+
 Vec3 Mapping::ForceInWorld(const Vec3& force) const noexcept {
   return (rotated_ ? Vec3(rotation_ * force) : force) / force_scale_;
 }

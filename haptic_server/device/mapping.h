@@ -21,6 +21,9 @@ class Mapping {
   /// With the present origin. // RT:
   Vec3 PointInWorld(const Vec3& point) const noexcept;
   Vec3 VelocityInWorld(const Vec3& velocity) const noexcept;
+  /// The way back. Not while the clutch has moved the origin.
+  Vec3 PointOnDevice(const Vec3& point) const noexcept;
+  Vec3 VelocityOnDevice(const Vec3& velocity) const noexcept;
   Vec3 ForceInWorld(const Vec3& force) const noexcept;
   Vec3 ForceOnDevice(const Vec3& force) const noexcept;
 

@@ -33,6 +33,12 @@ class MotorBoard {
   virtual const Hand* hand() const noexcept = 0;
 
   virtual std::string Name() const = 0;
+
+  /// What keeps the board from answering, in a few words; empty: nothing is known. // RT:
+  virtual const char* Trouble() const noexcept { return ""; }
+
+  /// The same in a sentence with the cure. From any thread.
+  virtual std::string Complaint() const { return ""; }
 };
 
 }  // namespace rikiseki::haptic

@@ -11,6 +11,8 @@ constexpr std::int64_t kLongestStepNs = 1'000'000;
 
 constexpr int kStirringStrokes = 500;  // then again from the first
 
+}  // namespace
+
 MotorProgram::Script ScriptOf(const HandSettings& hand) {
   const Vec3 home = hand.home_mm * 1e-3;
   const Vec3 reach = home + hand.stroke_mm * 1e-3;
@@ -39,14 +41,16 @@ MotorProgram::Script ScriptOf(const HandSettings& hand) {
   return script;
 }
 
-}  // namespace
+Impedance ImpedanceOf(const Settings& settings) {
+  return {.mass_kg = settings.hand.mass_kg + settings.spidar.moving_mass_kg,
+          .damping_ns_per_m =
+              settings.hand.damping_ns_per_m + settings.spidar.friction_damping_ns_per_m,
+          .stiffness_n_per_m = settings.hand.stiffness_n_per_m,
+          .friction_n = settings.spidar.friction_n};
+}
 
 Hand MakeHand(const Settings& settings) {
-  return {MotorProgram(ScriptOf(settings.hand)),
-          {.mass_kg = settings.hand.mass_kg + settings.spidar.moving_mass_kg,
-           .damping_ns_per_m =
-               settings.hand.damping_ns_per_m + settings.spidar.friction_damping_ns_per_m,
-           .stiffness_n_per_m = settings.hand.stiffness_n_per_m}};
+  return {MotorProgram(ScriptOf(settings.hand)), ImpedanceOf(settings)};
 }
 
 SimulatedBoard::SimulatedBoard(const SpidarSettings& spidar, Hand hand)
@@ -54,12 +58,14 @@ SimulatedBoard::SimulatedBoard(const SpidarSettings& spidar, Hand hand)
       home_lengths_(kinematics_.Lengths(Vec3::Zero())),
       count_length_m_(spidar.count_length_m),
       bounds_{spidar.tension_min_n, spidar.tension_max_n},
+      latency_ns_(std::llround(1e3 * spidar.latency_us)),
       hand_(std::move(hand)) {
   tension_.fill(spidar.tension_min_n);
 }
 
-bool SimulatedBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept {
-  const std::int64_t elapsed = started_ ? std::max<std::int64_t>(now_ns - now_ns_, 0) : 0;
+// Moves the hand on under the tensions that act now.
+void SimulatedBoard::MoveTo(std::int64_t now_ns) noexcept {
+  const std::int64_t elapsed = now_ns - now_ns_;
   const std::int64_t steps = (elapsed + kLongestStepNs - 1) / kLongestStepNs;
   for (std::int64_t i = 0; i < steps; ++i) {
     const Vec3 position = hand_.position();
@@ -69,8 +75,20 @@ bool SimulatedBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noex
     }
     hand_.Advance(elapsed * (i + 1) / steps - elapsed * i / steps, force);
   }
-  started_ = true;
   now_ns_ = now_ns;
+}
+
+bool SimulatedBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept {
+  if (!started_) now_ns_ = now_ns;
+  started_ = true;
+  now_ns = std::max(now_ns, now_ns_);
+  for (; obeyed_ != commanded_; ++obeyed_) {
+    const Command& next = commands_[obeyed_ % kCommands];
+    if (next.acts_ns > now_ns) break;
+    MoveTo(next.acts_ns);
+    tension_ = next.tension;
+  }
+  MoveTo(now_ns);
   const PerString lengths = kinematics_.Lengths(hand_.position());
   for (std::size_t string = 0; string < kTensionStrings; ++string) {
     counts[string] = std::llround((lengths[string] - home_lengths_[string]) / count_length_m_);
@@ -79,8 +97,14 @@ bool SimulatedBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noex
 }
 
 bool SimulatedBoard::WriteTensions(const FourStrings& tension) noexcept {
+  FourStrings clamped;
   for (std::size_t string = 0; string < kTensionStrings; ++string) {
-    tension_[string] = std::clamp(tension[string], bounds_.min_n, bounds_.max_n);
+    clamped[string] = std::clamp(tension[string], bounds_.min_n, bounds_.max_n);
+  }
+  if (latency_ns_ == 0) {
+    tension_ = clamped;
+  } else if (commanded_ - obeyed_ < kCommands) {
+    commands_[commanded_++ % kCommands] = {now_ns_ + latency_ns_, clamped};
   }
   return true;
 }

@@ -9,12 +9,19 @@
 
 namespace rikiseki::haptic {
 
+/// What the hand of the settings does.
+MotorProgram::Script ScriptOf(const HandSettings& hand);
+
 /// The hand of the settings as it holds the device of the settings: masses and dampings added.
+Impedance ImpedanceOf(const Settings& settings);
+
+/// Both together.
 Hand MakeHand(const Settings& settings);
 
 /// The body moves only when the encoders are read: up to that instant, under the tensions written
-/// last, whose directions are taken anew at least every millisecond. Lengths are rounded to whole
-/// counts and tensions clamped, as hardware would.
+/// last, whose directions are taken anew at least every millisecond. Tensions act
+/// spidar.latency_us after the reading that they answer. Lengths are rounded to whole counts and
+/// tensions clamped, as hardware would.
 class SimulatedBoard final : public MotorBoard {
  public:
   SimulatedBoard(const SpidarSettings& spidar, Hand hand);
@@ -32,12 +39,27 @@ class SimulatedBoard final : public MotorBoard {
   const FourStrings& tension() const noexcept { return tension_; }
 
  private:
+  // A command on its way to the motors.
+  struct Command {
+    std::int64_t acts_ns = 0;
+    FourStrings tension{};
+  };
+  // One a tick at no more than 8 kHz.
+  static constexpr std::size_t kCommands = 128;
+  static_assert(kCommands > kLongestLatencyUs * 1e-6 * 8000 + 1);
+
+  void MoveTo(std::int64_t now_ns) noexcept;
+
   SpidarKinematics kinematics_;
   PerString home_lengths_;
   double count_length_m_;
   TensionBounds bounds_;
+  std::int64_t latency_ns_;
   Hand hand_;
   FourStrings tension_{};
+  std::array<Command, kCommands> commands_{};
+  std::size_t commanded_ = 0;  // ever
+  std::size_t obeyed_ = 0;
   bool enabled_ = true;
   bool started_ = false;
   std::int64_t now_ns_ = 0;

@@ -90,6 +90,7 @@ void Spidar::Blame(const PerString& lengths) noexcept {
 }
 
 std::string Spidar::Complaint() const {
+  if (const std::string of_board = board_->Complaint(); !of_board.empty()) return of_board;
   const WrongString wrong = wrong_string_.load(std::memory_order_relaxed);
   if (wrong.number == 0) return "";
   std::ostringstream text;

@@ -27,10 +27,15 @@ class Spidar final : public Device {
   DeviceStatus Read(std::int64_t now_ns, DeviceSample& sample) noexcept override;
   Vec3 Write(const Vec3& force) noexcept override;
   void Release() noexcept override;
+  void SetVelocityCutoff(double cutoff_hz) noexcept override {
+    settings_.velocity_cutoff_hz = cutoff_hz;
+  }
   std::string Name() const override;
 
-  /// Names the string that makes Read a fault, counted from 1 as the motors of the device file are.
+  /// The board's own, else the string that makes Read a fault, counted from 1 as the motors of the
+  /// device file are.
   std::string Complaint() const override;
+  const char* Trouble() const noexcept override { return board_->Trouble(); }
 
  private:
   // What Complaint says, for it is asked by another thread than Read.

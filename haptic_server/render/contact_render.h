@@ -36,6 +36,9 @@ class ContactRender {
   std::span<const BodyShare> Update(const Finger& finger, FeatureTrack& track, LocalBodies& copies,
                                     Ledger& ledger, bool& no_channel) noexcept;
 
+  /// Other stiffness and damping from the next Update on. // RT:
+  void Tune(const RenderSettings& settings) noexcept { surface_force_.Tune(settings); }
+
   /// There is no contact in this tick. // RT:
   void Reset() noexcept;
 

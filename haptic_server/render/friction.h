@@ -33,6 +33,9 @@ class Friction {
   /// `stiffness` in N/m, positive.
   explicit Friction(double stiffness) : stiffness_(stiffness) {}
 
+  /// Likewise. // RT:
+  void SetStiffness(double stiffness) noexcept { stiffness_ = stiffness; }
+
   /// The tangential force [N, on the user]. Once per tick and body. // RT:
   Vec3 Force(const FrictionContact& contact, double elapsed_s) noexcept;
 

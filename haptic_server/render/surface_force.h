@@ -34,6 +34,13 @@ class SurfaceForce {
   std::span<BodyShare> Update(std::span<const Surface> surfaces, const ContactSolution& contact,
                               double radius, std::int64_t elapsed_ticks) noexcept;
 
+  /// Other stiffness and damping of surfaces that bring none of their own, and of friction. // RT:
+  void Tune(const RenderSettings& settings) noexcept {
+    stiffness_ = settings.stiffness_n_per_m;
+    damping_ = settings.damping_ns_per_m;
+    friction_.SetStiffness(settings.friction_stiffness_n_per_m);
+  }
+
   /// The finger is free, whatever came before. // RT:
   void Reset() noexcept {
     count_ = 0;

@@ -33,10 +33,15 @@ EnergyMeter::EnergyMeter(const Settings& settings)
     : damping_(settings.spidar.friction_damping_ns_per_m),
       largest_braking_(kLargestBraking * settings.spidar.moving_mass_kg /
                        Seconds(settings.period_ns())),
-      largest_split_(kHandsReach * settings.safety.force_cap_n),
       period_s_(Seconds(settings.period_ns())),
       history_(static_cast<std::size_t>(std::max<std::int64_t>(Ticks(kEnergyWindow, period_s_), 1)),
-               Excess{}) {}
+               Excess{}) {
+  Tune(settings.safety);
+}
+
+void EnergyMeter::Tune(const SafetySettings& settings) noexcept {
+  largest_split_ = kHandsReach * settings.force_cap_n;
+}
 
 void EnergyMeter::Measure(const EnergySample& sample) noexcept {
   double leak = 0;

@@ -52,6 +52,9 @@ class EnergyMeter {
   /// The tick before is over. // RT:
   void Measure(const EnergySample& sample) noexcept;
 
+  /// Another force cap. // RT:
+  void Tune(const SafetySettings& settings) noexcept;
+
   /// There is no sound sample: the tick before and the next cannot be judged. // RT:
   void Skip() noexcept { known_ = false; }
 
@@ -72,9 +75,9 @@ class EnergyMeter {
   void WatchPeaks(const EnergySample& sample) noexcept;
   void NotePeak() noexcept;
 
-  double damping_;          // N s/m, b
-  double largest_braking_;  // N s/m
-  double largest_split_;    // J, in a window
+  double damping_;            // N s/m, b
+  double largest_braking_;    // N s/m
+  double largest_split_ = 0;  // J, in a window
   double period_s_;
   std::int64_t window_ticks_;
 

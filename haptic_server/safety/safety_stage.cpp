@@ -31,12 +31,16 @@ bool Shorten(Vec3& v, double limit) {
 }  // namespace
 
 SafetyStage::SafetyStage(const Settings& settings)
-    : settings_(settings.safety),
-      period_s_(Seconds(settings.period_ns())),
-      largest_step_n_(settings.safety.slew_limit_n_per_s * period_s_ * kBelow),
-      ticks_to_zero_(
-          static_cast<std::int64_t>(std::ceil(settings.safety.force_cap_n / largest_step_n_)) + 1),
-      fault_after_misses_(settings.loop.fault_after_misses) {}
+    : period_s_(Seconds(settings.period_ns())),
+      fault_after_misses_(settings.loop.fault_after_misses) {
+  Tune(settings.safety);
+}
+
+void SafetyStage::Tune(const SafetySettings& settings) noexcept {
+  settings_ = settings;
+  largest_step_n_ = settings.slew_limit_n_per_s * period_s_ * kBelow;
+  ticks_to_zero_ = static_cast<std::int64_t>(std::ceil(settings.force_cap_n / largest_step_n_)) + 1;
+}
 
 ForceReason SafetyStage::Fault(const SafetyInput& input) noexcept {
   missed_in_a_row_ = input.missed > 0 ? missed_in_a_row_ + input.missed : 0;

@@ -41,6 +41,9 @@ class SafetyStage {
  public:
   explicit SafetyStage(const Settings& settings);
 
+  /// Other caps, limits and times from the next Limit on. // RT:
+  void Tune(const SafetySettings& settings) noexcept;
+
   /// The force to command [N]. // RT:
   Vec3 Limit(const SafetyInput& input) noexcept;
 
@@ -63,8 +66,8 @@ class SafetyStage {
 
   SafetySettings settings_;
   double period_s_;
-  double largest_step_n_;       // slew limit times nominal period
-  std::int64_t ticks_to_zero_;  // from the cap, at the slew limit
+  double largest_step_n_ = 0;       // slew limit times nominal period
+  std::int64_t ticks_to_zero_ = 0;  // from the cap, at the slew limit
   std::int64_t fault_after_misses_;
   std::int64_t missed_in_a_row_ = 0;
   std::int64_t zero_ticks_ = 0;  // for so long nothing is wanted

@@ -32,6 +32,9 @@ class SplitEnergy {
   /// `own_epoch`: acks of another haptic epoch mean nothing; 0 = all count.
   SplitEnergy(const PenaltyRule& rule, std::uint64_t history_ticks, std::uint64_t own_epoch);
 
+  /// Another stiffness [N/m] of surfaces that bring none of their own. // RT:
+  void Tune(double stiffness_n_per_m) noexcept { rule_.stiffness_n_per_m = stiffness_n_per_m; }
+
   /// The work [J, on the user] of the surfaces of bodies without a copy, since the tick before. Once
   /// per tick, before Receive. // RT:
   void Moved(double surface_work) noexcept {

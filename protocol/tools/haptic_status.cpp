@@ -1,9 +1,13 @@
 // haptic_status: what both daemons are doing, and above all why the force is what it is. An
 // observer: it maps both segments read-only and disturbs nobody.
+#include <unistd.h>
+
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <thread>
 
 #include "common/command_line.h"
@@ -72,6 +76,36 @@ std::string Durations(const Json& us) {
          Number(us["p99_9"], 0) + "  max " + Number(us["max"], 0) + " us";
 }
 
+// How late the loop woke up, by powers of ten.
+void PrintHistogram(const Json& us) {
+  struct Row {
+    const char* label;
+    double below_us;
+    std::uint64_t count = 0;
+  };
+  std::array<Row, 5> rows{{{"< 10 us", 10},
+                           {"< 100 us", 100},
+                           {"< 1 ms", 1e3},
+                           {"< 10 ms", 1e4},
+                           {"more", std::numeric_limits<double>::infinity()}}};
+  const double total = us["count"].get<double>();
+  if (total == 0) return;
+  for (const Json& bucket : us["buckets"]) {
+    for (Row& row : rows) {
+      if (bucket[0].get<double>() >= row.below_us) continue;
+      row.count += bucket[1].get<std::uint64_t>();
+      break;
+    }
+  }
+  for (const Row& row : rows) {
+    const double share = static_cast<double>(row.count) / total;
+    std::printf("             %-8s %9.4f %%  %-40.*s\n", row.label, 100 * share,
+                static_cast<int>(std::ceil(40 * share)),
+                "########################################");
+  }
+  std::fflush(stdout);
+}
+
 void PrintCommon(const char* who, const Json& side) {
   std::cout << who << "  " << side["state"].get<std::string>() << ", epoch " << side["epoch"]
             << ", pid " << side["pid"] << ", last sign of life "
@@ -84,7 +118,9 @@ void PrintLoop(const Json& side) {
             << (scheduling["memory_locked"].get<bool>() ? "locked" : "not locked") << ", "
             << side["missed"] << " deadlines missed\n"
             << "  lateness   " << Durations(side["lateness_us"]) << "\n"
-            << "  work       " << Durations(side["duration_us"]) << "\n";
+            << std::flush;
+  PrintHistogram(side["lateness_us"]);
+  std::cout << "  work       " << Durations(side["duration_us"]) << "\n";
 }
 
 // Local bodies; a jump beyond a millimetre says that the copies do not know something.
@@ -195,11 +231,13 @@ void PrintWorld(const Json& world) {
   }
 }
 
-void Print(const Json& report, bool json) {
-  if (json) {
+void Print(const Json& report, const Options& options) {
+  if (options.json) {
     std::cout << report.dump() << "\n" << std::flush;
     return;
   }
+  if (isatty(STDOUT_FILENO) != 0 && !options.once)
+    std::cout << "\x1b[H\x1b[J";  // over the last report
   PrintHaptic(report["haptic"]);
   PrintWorld(report["world"]);
   PrintBooks(report["books"]);
@@ -222,11 +260,11 @@ int Run(const Options& options) {
     if (options.once) {
       Sleep(kRateSampleSeconds);
       report = observer.Read();
-      Print(report, options.json);
+      Print(report, options);
       return kExitOk;
     }
     for (;; report = observer.Read()) {
-      Print(report, options.json);
+      Print(report, options);
       if (!std::cout) return kExitOk;  // the reader of a pipe went away
       Sleep(options.interval_s);
     }

@@ -35,11 +35,14 @@ Json Durations(const Histogram& histogram) {
   const auto microseconds = [&histogram](double fraction) {
     return static_cast<double>(HistogramQuantile(histogram, fraction)) * 1e-3;
   };
-  return {{"count", HistogramTotal(histogram)},
-          {"p50", microseconds(0.5)},
-          {"p99", microseconds(0.99)},
-          {"p99_9", microseconds(0.999)},
-          {"max", microseconds(1)}};
+  Json buckets = Json::array();  // [from us, count], those that are not empty
+  for (std::size_t i = 0; i < histogram.size(); ++i) {
+    if (histogram[i] == 0) continue;
+    buckets.push_back({static_cast<double>(HistogramLowerEdge(i)) * 1e-3, histogram[i]});
+  }
+  return {{"count", HistogramTotal(histogram)}, {"buckets", std::move(buckets)},
+          {"p50", microseconds(0.5)},           {"p99", microseconds(0.99)},
+          {"p99_9", microseconds(0.999)},       {"max", microseconds(1)}};
 }
 
 Json Scheduled(const Scheduling& scheduling) {

@@ -1,5 +1,6 @@
 // What a tick's arithmetic between encoder counts and tensions costs: lengths -> position -> tensions
-// of four strings, lengths -> pose -> tensions of eight. Per tick, p50 and p99 over a grip that moves
+// of four strings, lengths -> pose -> tensions of eight; and packets -> counts, tensions -> packets of
+// the two boards on the USB, without the bus. Per tick, p50 and p99 over a grip that moves
 // at 0.5 m/s under forces of which the strings cannot show the largest; the clock's own cost taken
 // off:
 //
@@ -15,9 +16,11 @@
 #include "haptic_server/device/spidar_kinematics.h"
 #include "haptic_server/device/spidar_pose.h"
 #include "haptic_server/device/tension.h"
+#include "haptic_server/device/usb/usb_board.h"
 #include "haptic_server/device/wrench_tension.h"
 #include "tests/bench/tick_clock.h"
 #include "tests/haptic_server/device/g6x3.h"
+#include "tests/usb/canned_port.h"
 
 namespace rikiseki::haptic {
 namespace {
@@ -99,6 +102,25 @@ void EightStringTick(benchmark::State& state) {
   });
 }
 
+void UsbBoardTick(benchmark::State& state) {
+  UsbSettings usb;
+  usb.board = state.range(0) == 203 ? UsbBoardModel::kSimple : UsbBoardModel::kSh4;
+  UsbBoard board(usb, 0.5, std::make_unique<test::CannedPort>(usb.board));
+  EncoderCounts counts{};
+  TimeTicks(state, [&](std::size_t k) {
+    benchmark::DoNotOptimize(board.ReadCounts(static_cast<std::int64_t>(k), counts));
+    const double pull = 1 + 1e-4 * static_cast<double>(k);
+    benchmark::DoNotOptimize(board.WriteTensions({pull, 2, 3, pull}));
+  });
+}
+
+// The number is the product id of the board.
+BENCHMARK(UsbBoardTick)
+    ->Arg(203)
+    ->Arg(205)
+    ->UseManualTime()
+    ->Iterations(kTicks)
+    ->Unit(benchmark::kMicrosecond);
 // The number is the largest force [N]; beside it, of the eight, a hundredth of it in N m.
 BENCHMARK(FourStringTick)
     ->Arg(5)

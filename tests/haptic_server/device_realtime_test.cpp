@@ -4,8 +4,10 @@
 
 #include "haptic_server/device/spidar_kinematics.h"
 #include "haptic_server/device/tension.h"
+#include "haptic_server/device/usb/usb_board.h"
 #include "tests/haptic_server/device/g6x3.h"
 #include "tests/haptic_server/guard.h"
+#include "tests/usb/canned_port.h"
 
 namespace rikiseki::haptic {
 namespace {
@@ -51,6 +53,30 @@ TEST_CASE("four strings: a suspect and forces out of reach allocate nothing and 
   REQUIRE(test::Allocations() == allocations);
   REQUIRE(test::Locks() == locks);
   REQUIRE(sum > 0);
+}
+
+TEST_CASE("boards on the USB: answered or not, the driver allocates nothing and locks nothing") {
+  for (const UsbBoardModel model : {UsbBoardModel::kSimple, UsbBoardModel::kSh4}) {
+    UsbSettings usb;
+    usb.board = model;
+    auto made = std::make_unique<test::CannedPort>(model);
+    test::CannedPort& port = *made;
+    UsbBoard board(usb, 0.5, std::move(made));
+    EncoderCounts counts{};
+    const long allocations = test::Allocations();
+    const long locks = test::Locks();
+    int read = 0;
+    for (std::int64_t tick = 0; tick < 500; ++tick) {
+      port.is_silent = tick % 100 > 60;  // long enough to be given up, and taken again
+      read += board.ReadCounts(tick * 1'000'000, counts) ? 1 : 0;
+      board.WriteTensions({1, 2, 3, 0.01 * static_cast<double>(tick)});
+      read += *board.Trouble() == '\0' ? 0 : 1'000;
+    }
+    CHECK(test::Allocations() == allocations);
+    CHECK(test::Locks() == locks);
+    CHECK(read % 1'000 >= 5 * 61);
+    CHECK(read > 1'000);
+  }
 }
 
 }  // namespace

@@ -13,6 +13,7 @@ namespace {
 
 const std::string kShipped = RIKISEKI_SOURCE_DIR "/config/haptic_server.ini";
 const std::string kShippedDevice = RIKISEKI_SOURCE_DIR "/config/devices/simulated.ini";
+const std::string kShippedBoard = RIKISEKI_SOURCE_DIR "/config/devices/spidar4_simple.ini";
 
 // A folder of its own for each test, with the shipped files to damage.
 class Folder {
@@ -84,6 +85,7 @@ TEST_CASE("the shipped files load and give every key, no more and no less") {
   for (std::string line; std::getline(lines, line);) known.insert(line.substr(0, line.find(' ')));
   std::set<std::string> shipped = KeysOf(kShipped);
   shipped.merge(KeysOf(kShippedDevice));
+  shipped.merge(KeysOf(kShippedBoard));
   REQUIRE(shipped == known);
 
   // What the files say is what the code has as default.
@@ -150,6 +152,16 @@ TEST_CASE("every key changes the settings") {
       "spidar.velocity_cutoff_hz=50",
       "spidar.moving_mass_kg=0.05",
       "spidar.friction_damping_ns_per_m=0.1",
+      "usb.board=sh4",
+      "usb.switch_id=3",
+      "usb.serial=17",
+      "usb.channels=4 5 6 7",
+      "usb.count_directions=1 -1 1 -1",
+      "usb.digit_per_volt=416",
+      "usb.volt_per_newton=0.3 0.31 0.32 0.33",
+      "usb.phase_mask=165",
+      "usb.enable_bit=2",
+      "usb.reply_within_us=300",
       "spidar.motors_m=-0.3 0.3 0.3, 0.3 0.3 -0.3, -0.3 -0.3 -0.3, 0.3 -0.3 0.3"};
   for (const std::string& change : changes) {
     std::string changed;

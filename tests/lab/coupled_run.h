@@ -57,7 +57,7 @@ class CoupledRun {
   /// Between two ticks another scene takes the place of the one that runs, as when its file changes.
   void ReplaceScene(const world::Scene& scene, std::unique_ptr<world::DynamicsWorld> dynamics,
                     world::Replacement how) {
-    world_.Replace(scene, std::move(dynamics), how);
+    world_.Replace({.scene = scene, .dynamics = std::move(dynamics), .how = how});
   }
 
   /// A silent world misses its ticks, shows no frame and no sign of life; afterwards it goes on

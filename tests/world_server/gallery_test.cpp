@@ -1,6 +1,5 @@
 // Every scene of config/scenes loads without a warning, is what its comment says, and moves sanely.
 #include <catch2/catch.hpp>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -55,9 +54,6 @@ TEST_CASE("two seconds of each scene with a finger in it: finite, and slower tha
   for (const auto& [path, loaded] : Gallery()) {
     CAPTURE(path);
     const Scene& scene = loaded.scene;
-    const bool large = scene.bodies.size() > 100;
-    // A thousand bodies fall asleep only after 2 s, which take 20.
-    const int frames = large && std::getenv("RIKISEKI_FULL") == nullptr ? 2 : 40;
     Settings settings;
     settings.features.radius_mm = 100;  // wherever things have rolled meanwhile
     WorldStep step(settings, scene, MakeDynamics(scene, 1e-3), 0);
@@ -69,7 +65,7 @@ TEST_CASE("two seconds of each scene with a finger in it: finite, and slower tha
     step.BeginHapticEpoch(1);
     step.Consume(tick);
     protocol::WorldFrame frame;
-    for (int i = 0; i < frames; ++i) {
+    for (int i = 0; i < 40; ++i) {
       step.Tick(0.05, frame);
       for (std::uint32_t j = 0; j < frame.plane_count; ++j) {
         REQUIRE(ToVec3(frame.planes[j].point).allFinite());
@@ -81,8 +77,7 @@ TEST_CASE("two seconds of each scene with a finger in it: finite, and slower tha
         REQUIRE(ToVec3(body.position).z() > -0.2);
       }
     }
-    const bool something = frame.plane_count > 0 || large;
-    CHECK(something);
+    CHECK(frame.plane_count > 0);
   }
 }
 

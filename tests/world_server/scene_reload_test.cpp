@@ -114,7 +114,7 @@ TEST_CASE("an included model is watched too, and what is asked for starts everyt
   const auto mass_2 = [](const protocol::Body& body) { return body.mass == 2; };
   CHECK(std::count_if(world.step().Bodies().begin(), world.step().Bodies().end(), mass_2) == 1);
 
-  world.reload().Restart();
+  world.reload().Restart(path);
   report = world.WaitForReport();
   REQUIRE(report);
   CHECK(report->replaced);
@@ -128,7 +128,7 @@ TEST_CASE("a scene that is not watched is read again only when it is asked for")
   Running world(path, /*watch=*/false);
   folder.Rename("scene.sdf", World(Ball("b", 0)));
   CHECK_FALSE(world.WaitForReport(1));
-  world.reload().Restart();
+  world.reload().Restart(path);
   const auto report = world.WaitForReport();
   REQUIRE(report);
   CHECK(report->replaced);

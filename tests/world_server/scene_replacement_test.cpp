@@ -55,14 +55,15 @@ class Running {
   }
 
   void Change(const Scene& scene, Replacement how = Replacement::kChange) {
-    step_.Replace(scene, std::make_unique<BulletWorld>(scene, 1e-3), how);
+    step_.Replace(
+        {.scene = scene, .dynamics = std::make_unique<BulletWorld>(scene, 1e-3), .how = how});
   }
 
   const protocol::Body& Body(std::size_t place) const { return step_.Bodies()[place]; }
   Vec3 Position(std::size_t place) const { return ToVec3(Body(place).position); }
   Vec3 Velocity(std::size_t place) const { return ToVec3(Body(place).velocity); }
   const WorldFrame& frame() const { return frame_; }
-  const WorldStep& step() const { return step_; }
+  WorldStep& step() { return step_; }
 
  private:
   static Settings SettingsFor(protocol::Coupling coupling) {
@@ -142,6 +143,47 @@ TEST_CASE("a change keeps the names, the planes and the way of what it does not 
     REQUIRE((changed.Position(2) - undisturbed.Position(1)).norm() <= 1e-6);
   }
   CHECK(undisturbed.Velocity(1).norm() < 1e-6);
+}
+
+TEST_CASE("what was prepared beside the loop costs the tick nothing but for what moves") {
+  Scene scene;
+  scene.name = "many";
+  scene.bodies = {Named(test::Floor(0.4), "floor::link")};
+  scene.bodies[0].pose_WB.position.z() = -0.01;  // pushes go through the origin
+  for (int i = 0; i < 200; ++i) {
+    scene.bodies.push_back(Named(test::Cube(0.02, 0.02, 0.4, {0.03 * (i % 20), 0.03 * (i / 20), 0}),
+                                 "cube" + std::to_string(i) + "::link"));
+  }
+  Running world(scene);
+  for (int i = 0; i < 4; ++i) world.Tick();
+  world.Push(world.Body(1), -20'000'000'000);  // 1 m/s, away from the others
+  world.Tick();
+  Successor successor;
+  successor.scene = scene;
+  successor.scene.bodies.push_back(Named(test::Cube(0.02, 0.02, 0.4, {2, 2, 0}), "new::link"));
+  auto dynamics = std::make_unique<BulletWorld>(successor.scene, 1e-3);
+  const BulletWorld& engine = *dynamics;
+  successor.dynamics = std::move(dynamics);
+  Prepare(world.step().Now(), 1e-3, successor);
+  CHECK(engine.awake() ==
+        2);      // it, and the new one, which has to sink into its resting depth first
+  world.Tick();  // the pushed one goes on meanwhile
+  std::vector<Vec3> before;
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) before.push_back(world.Position(i));
+  const Vec3 velocity = world.Velocity(1);
+  REQUIRE(velocity.norm() > 0.1);
+
+  const std::uint64_t prepared = engine.substeps();
+  world.step().Replace(std::move(successor));
+  CHECK(engine.substeps() == prepared);
+  CHECK(engine.awake() == 2);
+  CHECK(world.Velocity(1) == velocity);
+  for (std::size_t i = 0; i < before.size(); ++i) CHECK(world.Position(i) == before[i]);
+  CHECK(world.Body(201).body == 201);
+  // Substeps of a millisecond for those two, and none for any other.
+  world.Tick();
+  CHECK(engine.substeps() - prepared <= 100);
+  for (std::size_t i = 2; i < before.size(); ++i) CHECK(world.Position(i) == before[i]);
 }
 
 TEST_CASE("what a change puts elsewhere is there at rest, and another thing") {

@@ -7,6 +7,8 @@
 #include <set>
 #include <sstream>
 
+#include "tests/common/tuning_page.h"
+
 namespace rikiseki::world {
 namespace {
 
@@ -37,6 +39,13 @@ std::set<std::string> KeysOf(const std::string& text, bool sections) {
 }
 
 }  // namespace
+
+TEST_CASE("the page on tuning has every key of the world, and says which are live") {
+  ConfigValues values;
+  LoadSettings(kShipped, {}, nullptr, &values);
+  REQUIRE_FALSE(values.empty());
+  for (const auto& [key, value] : values) CheckTuningPage(key, LiveKeys());
+}
 
 TEST_CASE("the shipped file documents every key, with the defaults of the code") {
   std::string description;

@@ -225,7 +225,9 @@ TEST_CASE("a restart: new generations, old pushes discarded, the books go on") {
   message.tick = 3;
   message.channels[0].impulse = Units({0.3, 0, 0});
   step.Consume(message);  // pending when the scene goes
-  step.Replace(scene, std::make_unique<BulletWorld>(scene, 1e-3), Replacement::kRestart);
+  step.Replace({.scene = scene,
+                .dynamics = std::make_unique<BulletWorld>(scene, 1e-3),
+                .how = Replacement::kRestart});
   message.tick = 4;
   message.channels[0].impulse = Units({0.4, 0, 0});
   step.Consume(message);  // still for the old body
@@ -239,8 +241,9 @@ TEST_CASE("a restart: new generations, old pushes discarded, the books go on") {
   CHECK(step.health().resets == 1);
   CHECK(frame.frame == 2);
 
-  CHECK_THROWS_AS(step.Replace(test::CubeOnFloor(0.3), std::make_unique<BulletWorld>(scene, 1e-3),
-                               Replacement::kRestart),
+  CHECK_THROWS_AS(step.Replace({.scene = test::CubeOnFloor(0.3),
+                                .dynamics = std::make_unique<BulletWorld>(scene, 1e-3),
+                                .how = Replacement::kRestart}),
                   std::invalid_argument);
 }
 
@@ -278,7 +281,9 @@ TEST_CASE("health says what runs") {
   CHECK(step.Bodies()[1].mass == 1);
   Scene scene = test::FreeCube(1);
   scene.name = std::string(100, 'x');
-  step.Replace(scene, std::make_unique<BulletWorld>(scene, 1e-3), Replacement::kRestart);
+  step.Replace({.scene = scene,
+                .dynamics = std::make_unique<BulletWorld>(scene, 1e-3),
+                .how = Replacement::kRestart});
   CHECK(std::string(step.health().scene.data()) == std::string(63, 'x'));
 }
 

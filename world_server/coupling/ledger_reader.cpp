@@ -119,7 +119,8 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
          .angular_impulse = Minus(now.angular_impulse, before.angular_impulse),
          .first_moment = now.first_moment - before.first_moment - length_s * InSi(before.impulse),
          .angular_first_moment = now.angular_first_moment - before.angular_first_moment -
-                                 length_s * InSi(before.angular_impulse)});
+                                 length_s * InSi(before.angular_impulse),
+         .point = ToVec3(channel.contact_point)});
   }
   known_ = std::move(present);
   return increments;
@@ -181,7 +182,8 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
                                   .impulse = InSi(increment.impulse),
                                   .angular_impulse = InSi(increment.angular_impulse),
                                   .first_moment = increment.first_moment,
-                                  .angular_first_moment = increment.angular_first_moment});
+                                  .angular_first_moment = increment.angular_first_moment,
+                                  .point = increment.point});
     }
   }
   if (replays) replay_.ticks.back().end = replay_.impulses.size();

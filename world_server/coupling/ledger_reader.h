@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,7 @@ struct ReplayImpulse {
   // and N m s^2, which says when within it the impulse came.
   Vec3 first_moment = Vec3::Zero();
   Vec3 angular_first_moment = Vec3::Zero();
+  std::optional<Vec3> point = {};  // m, where it acted last
 };
 
 /// One consumed message, for `local`: the time it covers and what was displayed in it.
@@ -64,6 +66,9 @@ class LedgerReader {
   /// no more than `largest_impulse_ns` (force cap times gap): messages beyond it are discarded
   /// whole.
   LedgerReader(std::uint64_t own_epoch, protocol::Coupling coupling, double largest_impulse_ns);
+
+  /// Another bound, from the next message on.
+  void SetLargestImpulse(double largest_impulse_ns) { largest_impulse_ns_ = largest_impulse_ns; }
 
   /// Says which bodies there are, by their number on the wire. What is pending for one that is no
   /// longer what it was is discarded as kUnknownBody; for the others it stays.
@@ -107,6 +112,7 @@ class LedgerReader {
     protocol::ImpulseUnits angular_impulse{};
     Vec3 first_moment = Vec3::Zero();  // of what came since the message before
     Vec3 angular_first_moment = Vec3::Zero();
+    Vec3 point = Vec3::Zero();  // m, of the latest contact
   };
   struct OwedUnits {
     protocol::ImpulseUnits impulse{};

@@ -50,8 +50,10 @@ class Schedule {
           angular_impulse = ProfileShare(push.angular_impulse, push.angular_first_moment, block_s,
                                          i, blocks, largest_impulse_ns_);
         }
-        pushes_.push_back(
-            {.body = push.body, .impulse = impulse, .angular_impulse = angular_impulse});
+        pushes_.push_back({.body = push.body,
+                           .impulse = impulse,
+                           .angular_impulse = angular_impulse,
+                           .point = push.point});
       }
       Close(length_s / blocks, impulses.size());
     }

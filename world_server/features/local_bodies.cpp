@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "world_server/features/joint_sites.h"
 #include "world_server/physics/air.h"
 #include "world_server/scene/shape_size.h"
 
@@ -9,6 +10,8 @@ namespace rikiseki::world {
 namespace {
 
 constexpr double kSteadyAir = 0.2;  // of the speed, in two periods
+constexpr double kTouching =
+    1e-3;  // m: farther, a neighbour is pushed after the next frame at best
 
 struct Candidate {
   std::size_t body = 0;
@@ -47,19 +50,32 @@ class Search {
   bool AddWithNeighbours(std::size_t body) {
     if (Has(body)) return true;
     if (found_.size() == room_ || Brakes(body)) return false;
-    std::vector<ContactSite> sites;
+    std::vector<ContactSite> sites = JointSites(scene_, states_, body, Reach(body));
+    // A joint of two copies stands with the one that was found first.
+    std::erase_if(sites, [&](const ContactSite& site) { return Has(site.other); });
+    const auto held = static_cast<std::ptrdiff_t>(sites.size());
     if (!dynamics_.FindContacts(body, Reach(body), sites)) return false;
-    if (sites.size() > protocol::kMaxContactPlanes) return false;
+    if (held > 0) {
+      const auto out_of_reach =
+          std::remove_if(sites.begin() + held, sites.end(), [&](const ContactSite& site) {
+            return scene_.bodies[site.other].fixed && !JointsLetMeet(scene_, states_, body, site);
+          });
+      sites.erase(out_of_reach, sites.end());
+    }
+    // What it may come to later than to all these, the next frame tells.
+    if (sites.size() > protocol::kMaxContactPlanes) sites.resize(protocol::kMaxContactPlanes);
     const std::size_t place = found_.size();
     found_.push_back({.body = body, .sites = std::move(sites)});
     for (std::size_t i = 0; i < found_[place].sites.size(); ++i) {
       const std::size_t other = found_[place].sites[i].other;
-      if (scene_.bodies[other].fixed) continue;
+      if (other == ContactSite::kNobody || scene_.bodies[other].fixed) continue;
       const std::size_t before = found_.size();
       if (AddWithNeighbours(other)) continue;
       found_.resize(before);
-      if (scene_.bodies[other].mass_kg < kHeavyNeighbour * scene_.bodies[body].mass_kg)
+      if (found_[place].sites[i].gap < kTouching &&
+          scene_.bodies[other].mass_kg < kHeavyNeighbour * scene_.bodies[body].mass_kg) {
         return false;
+      }
     }
     return true;
   }
@@ -94,8 +110,9 @@ class Search {
 
 protocol::ContactPlane ToPlane(const ContactSite& site,
                                std::span<const std::uint32_t> generations) {
-  return {.other_body = static_cast<std::uint32_t>(site.other),
-          .other_generation = generations[site.other],
+  const bool is_of_body = site.other != ContactSite::kNobody;
+  return {.other_body = is_of_body ? static_cast<std::uint32_t>(site.other) : kNoBody,
+          .other_generation = is_of_body ? generations[site.other] : 0,
           .point = ToArray(site.p_B),
           .normal = ToArray(site.normal),
           .gap = site.gap,
@@ -138,6 +155,16 @@ std::uint32_t FindLocalBodies(const Scene& scene, const DynamicsWorld& dynamics,
       const BodyInertia inertia = BodyInertia::Of(body.mass_kg, body.inertia);
       local.acceleration = ToArray(Vec3(gravity + air.Acceleration(inertia, state)));
       local.angular_acceleration = ToArray(air.AngularAcceleration(inertia, state));
+    }
+    const JointResistance resistance =
+        ResistanceOfJoints(scene, states, candidate.body, 2 * reach.period_s);
+    if (!resistance.force.isZero(0) || !resistance.torque.isZero(0)) {
+      const BodyInertia inertia = BodyInertia::Of(body.mass_kg, body.inertia);
+      local.acceleration =
+          ToArray(Vec3(ToVec3(local.acceleration) + resistance.force / body.mass_kg));
+      local.angular_acceleration =
+          ToArray(Vec3(ToVec3(local.angular_acceleration) +
+                       inertia.InverseInertia(state.pose.orientation) * resistance.torque));
     }
     for (const ContactSite& site : candidate.sites) {
       // A contact of two copies stands with the one of the lower number, unless only the other

@@ -17,10 +17,13 @@ namespace rikiseki::world {
 /// times heavier; lighter ones as planes are worse than unknown (+29 to +943 % of displacement).
 inline constexpr double kHeavyNeighbour = 10;
 
+/// Who stands on the other side of a joint to the world, on the wire. SPEC.md 6.2.
+inline constexpr std::uint32_t kNoBody = 0xffffffff;
+
 /// Fills `local_bodies` with the movable bodies of `planes`, nearest first, and the movable
-/// neighbours that they can push, and returns how many. A body whose contacts cannot all be told -
-/// too many, a shape that FindContacts does not know, a light neighbour for which there is no room -
-/// is left out: it moves by the frames alone.
+/// neighbours that they can push, and returns how many. Of more contacts than a copy can have it gets
+/// its joints and the nearest. A body whose contacts cannot be told - something bounces, it touches
+/// a light neighbour for which there is no room - is left out: it moves by the frames alone.
 std::uint32_t FindLocalBodies(const Scene& scene, const DynamicsWorld& dynamics,
                               std::span<const BodyState> states,
                               std::span<const std::uint32_t> generations,

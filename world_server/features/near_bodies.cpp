@@ -59,7 +59,9 @@ void NearBodies::Find(std::span<const BodyState> states, const Vec3& p, double r
     const double reach = radii_[body] + radius_m + WayOf(body, state, time_s);
     if (!((state.pose.position - p).squaredNorm() > reach * reach)) found.push_back(body);
   }
-  tree_.VisitNear(p, radius_m, [&](std::uint32_t item) { found.push_back(planted_[item]); });
+  tree_.VisitNear(
+      p, radius_m, [](std::uint32_t) { return true; },
+      [&](std::uint32_t place) { found.push_back(planted_[tree_.items()[place]]); });
   std::sort(found.begin(), found.end());
 }
 

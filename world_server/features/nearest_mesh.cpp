@@ -27,16 +27,15 @@ struct Foot {
   std::uint32_t face = 0;
 };
 
-Foot FootOn(const TriangleMesh& mesh, std::uint32_t face, const Vec3& p) {
-  const TriangleMesh::Face& triangle = mesh.faces()[face];
-  const Vec3& a = mesh.corners()[triangle.corners[0]];
-  const TriangleFoot foot = FootOnTriangle(a, mesh.corners()[triangle.corners[1]],
-                                           mesh.corners()[triangle.corners[2]], p);
+// `place` in the tree's leaves.
+Foot FootOn(const TriangleMesh& mesh, std::uint32_t place, const Vec3& p) {
+  const TriangleMesh::LeafFace& face = mesh.leaf_face(place);
+  const Vec3& a = face.corners[0];
+  const TriangleFoot foot = FootOnTriangle(a, face.corners[1], face.corners[2], p);
   // Along the normal it is exact to rounding however large the face is.
-  const Vec3 point = foot.part == Foot::Part::kFace
-                         ? Vec3(p - triangle.normal.dot(p - a) * triangle.normal)
-                         : foot.point;
-  return {point, foot.part, foot.index, face};
+  const Vec3 point =
+      foot.part == Foot::Part::kFace ? Vec3(p - face.normal.dot(p - a) * face.normal) : foot.point;
+  return {point, foot.part, foot.index, mesh.tree().items()[place]};
 }
 
 std::uint32_t CornerOf(const TriangleMesh& mesh, const Foot& foot) {
@@ -93,36 +92,46 @@ class Nearest {
   bool tied() const { return tied_; }
 
  private:
-  struct Visit {
-    std::uint32_t node;
-    double squared_distance;
+  // A box to look into, and how far it is.
+  struct Waiting {
+    float squared_distance;
+    std::uint32_t box;
   };
 
   void Walk() {
-    const auto& nodes = mesh_.tree().nodes();
-    std::array<Visit, BoxTree::kDeepest> stack;
-    std::size_t depth = 0;
-    stack[depth++] = {0, nodes[0].bounds.SquaredDistance(p_)};
-    while (depth > 0) {
-      const Visit visit = stack[--depth];
-      if (visit.squared_distance > reach_) continue;
-      const BoxTree::Node& node = nodes[visit.node];
-      if (node.count == 0) {
-        Visit near{node.first, nodes[node.first].bounds.SquaredDistance(p_)};
-        Visit far{node.first + 1, nodes[node.first + 1].bounds.SquaredDistance(p_)};
-        if (far.squared_distance < near.squared_distance) std::swap(near, far);
-        if (far.squared_distance <= reach_) stack[depth++] = far;
-        stack[depth++] = near;
-        continue;
-      }
-      for (std::uint32_t i = 0; i < node.count; ++i) {
-        Look(mesh_.tree().items()[node.first + i]);
-      }
+    Open(0);
+    while (count_ > 0) {
+      const Waiting next = waiting_[--count_];
+      if (next.squared_distance > limit_) continue;
+      const BoxTree::Node& node = mesh_.tree().nodes()[next.box / BoxTree::kWidth];
+      const std::uint32_t first = node.first[next.box % BoxTree::kWidth];
+      const std::uint32_t items = node.count[next.box % BoxTree::kWidth];
+      if (items == 0) Open(first);
+      for (std::uint32_t i = 0; i < items; ++i) Look(first + i);
     }
   }
 
-  void Look(std::uint32_t face) {
-    const Foot foot = FootOn(mesh_, face, p_);
+  // The nearest of its boxes is the next.
+  void Open(std::uint32_t node) {
+    const BoxTree::Four distances = eye_.SquaredDistances(mesh_.tree().nodes()[node]);
+    const std::size_t begin = count_;
+    for (std::uint32_t lane = 0; lane < BoxTree::kWidth; ++lane) {
+      const float distance = distances[static_cast<int>(lane)];
+      if (distance > limit_) continue;
+      std::size_t place = count_++;
+      for (; place > begin && waiting_[place - 1].squared_distance < distance; --place) {
+        waiting_[place] = waiting_[place - 1];
+      }
+      waiting_[place] = {distance, BoxTree::BoxNumber(node, lane)};
+    }
+  }
+
+  void Look(std::uint32_t place) {
+    const TriangleMesh::LeafFace& leaf = mesh_.leaf_face(place);
+    const double height = leaf.normal.dot(p_ - leaf.corners[0]);
+    if (height * height > reach_) return;
+    const Foot foot = FootOn(mesh_, place, p_);
+    const std::uint32_t face = foot.face;
     const double squared_distance = (p_ - foot.point).squaredNorm();
     if (squared_distance > reach_) return;
     const double distance = std::sqrt(squared_distance);
@@ -139,6 +148,7 @@ class Nearest {
     foot_ = foot;
     distance_ = distance;
     reach_ = (distance + 2 * tie) * (distance + 2 * tie);
+    limit_ = eye_.Limit(distance + 2 * tie);
   }
 
   const TriangleMesh& mesh_;
@@ -146,6 +156,10 @@ class Nearest {
   Foot foot_;
   double distance_ = std::numeric_limits<double>::infinity();
   double reach_ = std::numeric_limits<double>::infinity();  // squared
+  const BoxTree::Eye eye_{p_};
+  float limit_ = eye_.Limit(reach_);  // as reach_, for boxes
+  std::array<Waiting, BoxTree::kMostWaiting> waiting_;
+  std::size_t count_ = 0;
   bool tied_ = false;
 };
 
@@ -175,13 +189,13 @@ bool IsMinimum(const TriangleMesh& mesh, const Foot& foot, const Vec3& p) {
   return true;
 }
 
-// Whether the normals of a node's surface can point at p: else no minimum is in it. After D. Johnson
+// Whether the normals of the surface in a box can point at p: else no minimum is in it. After D. Johnson
 // and E. Cohen, "Spatialized normal cone hierarchies", 2001.
-bool MayFace(const TriangleMesh& mesh, std::uint32_t node, const Vec3& p) {
-  const TriangleMesh::NormalCone& cone = mesh.cone(node);
+bool MayFace(const TriangleMesh& mesh, std::uint32_t box, const Vec3& p) {
+  const TriangleMesh::NormalCone& cone = mesh.cone(box);
   if (cone.half_angle >= std::numbers::pi / 2) return true;
-  const Bounds& bounds = mesh.tree().nodes()[node].bounds;
-  const Vec3 towards = p - (bounds.low + bounds.high) / 2;
+  const Bounds bounds = mesh.tree().BoxOf(box);
+  const Vec3 towards = p - bounds.Middle();
   const double squared_radius = (bounds.high - bounds.low).squaredNorm() / 4;
   const double squared_tangent = towards.squaredNorm() - squared_radius;
   if (squared_tangent <= 0) return true;
@@ -195,26 +209,13 @@ bool MayFace(const TriangleMesh& mesh, std::uint32_t node, const Vec3& p) {
 
 void FindMinima(const TriangleMesh& mesh, const Vec3& p, double radius,
                 std::vector<NearestPoint>& minima) {
-  const auto& nodes = mesh.tree().nodes();
-  std::array<std::uint32_t, BoxTree::kDeepest> stack;
-  std::size_t depth = 0;
-  stack[depth++] = 0;
-  while (depth > 0) {
-    const std::uint32_t number = stack[--depth];
-    const BoxTree::Node& node = nodes[number];
-    if (node.bounds.SquaredDistance(p) > radius * radius || !MayFace(mesh, number, p)) continue;
-    if (node.count == 0) {
-      stack[depth++] = node.first + 1;
-      stack[depth++] = node.first;
-      continue;
-    }
-    for (std::uint32_t i = 0; i < node.count; ++i) {
-      const Foot foot = FootOn(mesh, mesh.tree().items()[node.first + i], p);
-      if (!IsMinimum(mesh, foot, p)) continue;
-      const NearestPoint minimum = PointAt(mesh, foot, p);
-      if (minimum.distance <= radius) minima.push_back(minimum);
-    }
-  }
+  const auto may_face = [&](std::uint32_t box) { return MayFace(mesh, box, p); };
+  mesh.tree().VisitNear(p, radius, may_face, [&](std::uint32_t place) {
+    const Foot foot = FootOn(mesh, place, p);
+    if (!IsMinimum(mesh, foot, p)) return;
+    const NearestPoint minimum = PointAt(mesh, foot, p);
+    if (minimum.distance <= radius) minima.push_back(minimum);
+  });
   std::stable_sort(minima.begin(), minima.end(), [](const NearestPoint& a, const NearestPoint& b) {
     return a.distance < b.distance;
   });

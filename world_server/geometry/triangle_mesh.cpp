@@ -30,15 +30,20 @@ double Angle(const Vec3& a, const Vec3& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
 }
 
-// The narrowest cone about the middle of two axes that holds both.
-TriangleMesh::NormalCone Join(const TriangleMesh::NormalCone& a,
-                              const TriangleMesh::NormalCone& b) {
-  const Vec3 sum = a.axis + b.axis;
-  if (sum.norm() < 1e-9) return {.axis = a.axis, .half_angle = std::numbers::pi};
-  const Vec3 axis = sum.normalized();
-  const double half_angle =
-      std::max(Angle(axis, a.axis) + a.half_angle, Angle(axis, b.axis) + b.half_angle);
-  return {.axis = axis, .half_angle = std::min(half_angle, std::numbers::pi)};
+// The narrowest cone about the middle of the axes that holds all.
+TriangleMesh::NormalCone Join(std::span<const TriangleMesh::NormalCone> cones) {
+  TriangleMesh::NormalCone joined{.axis = Vec3::Zero()};
+  for (const TriangleMesh::NormalCone& cone : cones) joined.axis += cone.axis;
+  if (joined.axis.norm() < 1e-9) {
+    return {.axis = cones[0].axis, .half_angle = std::numbers::pi};
+  }
+  joined.axis.normalize();
+  for (const TriangleMesh::NormalCone& cone : cones) {
+    joined.half_angle =
+        std::max(joined.half_angle, Angle(joined.axis, cone.axis) + cone.half_angle);
+  }
+  joined.half_angle = std::min(joined.half_angle, std::numbers::pi);
+  return joined;
 }
 
 }  // namespace
@@ -54,10 +59,16 @@ TriangleMesh::TriangleMesh(std::span<const Vec3> corners, std::span<const Triang
   std::vector<Bounds> boxes(faces_.size());
   for (std::size_t i = 0; i < faces_.size(); ++i) {
     for (const std::uint32_t corner : faces_[i].corners) boxes[i].Add(corners_[corner]);
+    bounds_.Add(boxes[i]);
   }
   tree_ = BoxTree(boxes, kLeafSize);
+  for (const std::uint32_t item : tree_.items()) {
+    LeafFace& leaf = leaf_faces_.emplace_back();
+    for (std::size_t i = 0; i < 3; ++i) leaf.corners[i] = corners_[faces_[item].corners[i]];
+    leaf.normal = faces_[item].normal;
+  }
   for (const Vec3& corner : corners_) {
-    radius_ = std::max(radius_, (corner - (bounds().low + bounds().high) / 2).norm());
+    radius_ = std::max(radius_, (corner - bounds_.Middle()).norm());
   }
   FindCones();
 }
@@ -169,29 +180,39 @@ void TriangleMesh::FindCornerNormals() {
 
 // An edge or a corner is met along the normals between those of its faces, so a triangle's cone
 // holds those of all that touch it. At an open border the surface is met from any side.
-void TriangleMesh::FindCones() {
-  cones_.resize(tree_.nodes().size());
-  for (std::size_t i = tree_.nodes().size(); i-- > 0;) {
-    const BoxTree::Node& node = tree_.nodes()[i];
-    if (node.count == 0) {
-      cones_[i] = Join(cones_[node.first], cones_[node.first + 1]);
-      continue;
-    }
-    const auto items = std::span(tree_.items()).subspan(node.first, node.count);
-    NormalCone cone{.axis = Vec3::Zero(), .half_angle = 0};
-    for (const std::uint32_t face : items) cone.axis += faces_[face].normal;
-    cone.axis = cone.axis.norm() > 1e-9 ? Vec3(cone.axis.normalized()) : faces_[items[0]].normal;
-    for (const std::uint32_t face : items) {
-      for (const std::uint32_t corner : faces_[face].corners) {
-        if (open_corners_[corner] != 0) cone.half_angle = std::numbers::pi;
-        for (const std::uint32_t touching : FacesAt(corner)) {
-          cone.half_angle = std::max(cone.half_angle, Angle(cone.axis, faces_[touching].normal));
-        }
+TriangleMesh::NormalCone TriangleMesh::ConeOf(std::span<const std::uint32_t> faces) const {
+  NormalCone cone{.axis = Vec3::Zero()};
+  for (const std::uint32_t face : faces) cone.axis += faces_[face].normal;
+  cone.axis = cone.axis.norm() > 1e-9 ? Vec3(cone.axis.normalized()) : faces_[faces[0]].normal;
+  for (const std::uint32_t face : faces) {
+    for (const std::uint32_t corner : faces_[face].corners) {
+      if (open_corners_[corner] != 0) cone.half_angle = std::numbers::pi;
+      for (const std::uint32_t touching : FacesAt(corner)) {
+        cone.half_angle = std::max(cone.half_angle, Angle(cone.axis, faces_[touching].normal));
       }
     }
-    // Normals between others stay within a cone only up to a half space.
-    if (cone.half_angle > std::numbers::pi / 2) cone.half_angle = std::numbers::pi;
-    cones_[i] = cone;
+  }
+  // Normals between others stay within a cone only up to a half space.
+  if (cone.half_angle > std::numbers::pi / 2) cone.half_angle = std::numbers::pi;
+  return cone;
+}
+
+void TriangleMesh::FindCones() {
+  const std::vector<BoxTree::Node>& nodes = tree_.nodes();
+  cones_.resize(BoxTree::kWidth * nodes.size());
+  for (std::size_t box = cones_.size(); box-- > 0;) {
+    const auto number = static_cast<std::uint32_t>(box);
+    if (!tree_.Has(number)) continue;
+    const BoxTree::Node& node = nodes[box / BoxTree::kWidth];
+    const std::uint32_t first = node.first[box % BoxTree::kWidth];
+    const std::uint32_t count = node.count[box % BoxTree::kWidth];
+    if (count > 0) {
+      cones_[box] = ConeOf(std::span(tree_.items()).subspan(first, count));
+      continue;
+    }
+    std::uint32_t within = 0;
+    while (within < BoxTree::kWidth && tree_.Has(BoxTree::BoxNumber(first, within))) ++within;
+    cones_[box] = Join(std::span(cones_).subspan(BoxTree::BoxNumber(first, 0), within));
   }
   for (NormalCone& cone : cones_) {
     cone.cosine = std::cos(cone.half_angle);

@@ -36,7 +36,13 @@ class TriangleMesh {
     Vec3 normal = Vec3::UnitZ();               // unit, outward
   };
 
-  /// The normals at which a node's surface may be met: of its triangles and their neighbours.
+  /// A face as the tree's leaves need it, at its place in tree().items().
+  struct LeafFace {
+    std::array<Vec3, 3> corners;
+    Vec3 normal;
+  };
+
+  /// The normals at which the surface in a box may be met: of its triangles and their neighbours.
   struct NormalCone {
     Vec3 axis = Vec3::UnitZ();
     double half_angle = 0;        // rad; pi: any
@@ -51,7 +57,7 @@ class TriangleMesh {
   const std::vector<Face>& faces() const { return faces_; }
   const BoxTree& tree() const { return tree_; }
   const MeshFlaws& flaws() const { return flaws_; }
-  const Bounds& bounds() const { return tree_.nodes()[0].bounds; }
+  const Bounds& bounds() const { return bounds_; }
 
   /// The length that rounding is relative to: the diagonal of its bounds.
   double size() const { return (bounds().high - bounds().low).norm(); }
@@ -62,7 +68,9 @@ class TriangleMesh {
   /// m^3; > 0 where the triangles of a closed mesh look outward.
   double Volume() const;
 
-  const NormalCone& cone(std::size_t node) const { return cones_[node]; }
+  const LeafFace& leaf_face(std::size_t place) const { return leaf_faces_[place]; }
+  /// Of one of the tree's boxes.
+  const NormalCone& cone(std::uint32_t box) const { return cones_[box]; }
   const Vec3& corner_normal(std::uint32_t corner) const { return corner_normals_[corner]; }
   bool corner_is_open(std::uint32_t corner) const { return open_corners_[corner] != 0; }
 
@@ -80,6 +88,7 @@ class TriangleMesh {
   void DropUnusedCorners();
   void Connect();
   void FindCornerNormals();
+  NormalCone ConeOf(std::span<const std::uint32_t> faces) const;
   void FindCones();
 
   std::vector<Vec3> corners_;
@@ -87,7 +96,9 @@ class TriangleMesh {
   std::vector<Vec3> corner_normals_;
   std::vector<std::uint8_t> open_corners_;
   std::vector<std::uint32_t> faces_begin_, faces_at_;
+  Bounds bounds_;
   BoxTree tree_;
+  std::vector<LeafFace> leaf_faces_;
   std::vector<NormalCone> cones_;
   MeshFlaws flaws_;
   double radius_ = 0;

@@ -21,6 +21,9 @@ namespace {
 // Groups are worked out anew so often: longer, and slow bodies far from each other become one group;
 // shorter, and finding groups costs more than stepping.
 constexpr double kWindow = 0.01;  // s
+// Where something may come farther in a window, of the size of the smallest, that ends sooner: the bodies
+// within reach grow as the cube of the way, and a push reaches as the square of the time.
+constexpr double kFarWay = 0.25;
 // A window of ticks that are a little too long by rounding is still one window.
 constexpr double kSameTime = 1e-9;  // relative
 
@@ -41,6 +44,12 @@ class KnownPairs final : public btNullPairCache {
   const ContactPairs& pairs_;
   btBroadphasePair found_;
 };
+
+// m/s, that an impulse may add anywhere on a body.
+double AddedSpeed(const MovingBody& body, const Vec3& impulse, const Vec3& angular_impulse) {
+  return impulse.norm() / body.inertia.mass_kg +
+         body.outer_radius * body.inertia.inverse_B.diagonal().maxCoeff() * angular_impulse.norm();
+}
 
 // A part of a window in which what a push reaches is stepped, and the pushes at its start.
 struct FineStep {
@@ -88,6 +97,10 @@ struct BulletWorld::Engine {
     broadphase.optimize();
   }
 
+  Kick KickOn(const PlacedImpulse& push) const;
+  double FastestSpeed();
+  double PushedSpeed(const PlacedImpulse& push) const;
+  std::size_t WindowEnd(std::size_t first);
   void Mark(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse);
   void Apply(const Kick& kick);
   void Apply(const PlacedImpulse& push);
@@ -99,16 +112,20 @@ struct BulletWorld::Engine {
   void Step(const Group& group, double length_s, double longest_s, int sweeps);
 };
 
+// Of a body that moves, as it is now.
+Kick BulletWorld::Engine::KickOn(const PlacedImpulse& push) const {
+  const MovingBody& body = bodies.moving[bodies.moving_of[push.body]];
+  const Vec3 centre = body.State().pose.position;
+  return KickOf(WithinReach(push, centre, body.outer_radius), centre);
+}
+
 // A push is on its way, or has come: its body wakes.
 void BulletWorld::Engine::Mark(std::size_t body, const Vec3& impulse, const Vec3& angular_impulse) {
   if (impulse.isZero(0) && angular_impulse.isZero(0)) return;
   sleepers.Wake(body);
   if (pushed[body] == 0) all_pushed.push_back(body);
   pushed[body] = 1;
-  const MovingBody& moving = bodies.moving[body];
-  pushed_speed[body] +=
-      impulse.norm() / moving.inertia.mass_kg +
-      moving.outer_radius * moving.inertia.inverse_B.diagonal().maxCoeff() * angular_impulse.norm();
+  pushed_speed[body] += AddedSpeed(bodies.moving[body], impulse, angular_impulse);
 }
 
 void BulletWorld::Engine::Apply(const Kick& kick) {
@@ -123,9 +140,8 @@ void BulletWorld::Engine::Apply(const Kick& kick) {
 
 void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
   const std::size_t place = bodies.moving_of[push.body];
-  const MovingBody& body = bodies.moving[place];
-  const Kick kick = KickOf(push, body.State().pose.position);
-  ApplyKick(body, kick.impulse, kick.angular_impulse);
+  const Kick kick = KickOn(push);
+  ApplyKick(bodies.moving[place], kick.impulse, kick.angular_impulse);
   world.joints().Settle(place);
 }
 
@@ -170,7 +186,7 @@ void BulletWorld::Engine::PassWindow(std::span<const FineStep> steps, double win
       const std::size_t body = bodies.moving_of[push.body];
       if (body == BulletBodies::kFixed) continue;
       // About a centre that may move a little until then.
-      const Kick kick = KickOf(push, bodies.moving[body].State().pose.position);
+      const Kick kick = KickOn(push);
       Mark(body, kick.impulse, kick.angular_impulse);
     }
   }
@@ -205,16 +221,43 @@ void BulletWorld::Engine::Advance(std::span<const Stretch> stretches, double sub
   }
   std::size_t first = 0;
   while (first < fine_steps.size()) {
-    double window_s = fine_steps[first].length_s;
-    std::size_t end = first + 1;
-    while (end < fine_steps.size() &&
-           window_s + fine_steps[end].length_s <= kWindow * (1 + kSameTime)) {
-      window_s += fine_steps[end++].length_s;
-    }
-    PassWindow(std::span(fine_steps).subspan(first, end - first), window_s, substep_s,
-               long_substeps);
+    const std::size_t end = WindowEnd(first);
+    const std::span<const FineStep> steps = std::span(fine_steps).subspan(first, end - first);
+    double window_s = 0;
+    for (const FineStep& step : steps) window_s += step.length_s;
+    PassWindow(steps, window_s, substep_s, long_substeps);
     first = end;
   }
+}
+
+double BulletWorld::Engine::FastestSpeed() {
+  double fastest = 0;
+  for (const std::size_t body : sleepers.awake()) {
+    fastest = std::max(fastest, bodies.moving[body].Speed());
+  }
+  return fastest;
+}
+
+double BulletWorld::Engine::PushedSpeed(const PlacedImpulse& push) const {
+  const std::size_t place = bodies.moving_of[push.body];
+  if (place == BulletBodies::kFixed) return 0;
+  const MovingBody& body = bodies.moving[place];
+  const Kick kick = KickOn(push);
+  return AddedSpeed(body, kick.impulse, kick.angular_impulse);
+}
+
+// The window that begins with fine step `first` ends before this one.
+std::size_t BulletWorld::Engine::WindowEnd(std::size_t first) {
+  double speed = FastestSpeed();
+  double window_s = 0;
+  std::size_t end = first;
+  for (; end < fine_steps.size(); ++end) {
+    for (const PlacedImpulse& push : fine_steps[end].pushes) speed += PushedSpeed(push);
+    window_s += fine_steps[end].length_s;
+    if (end == first) continue;  // at least one
+    if (window_s > kWindow * (1 + kSameTime) || speed * window_s > kFarWay * bodies.smallest) break;
+  }
+  return end;
 }
 
 BulletWorld::BulletWorld(const Scene& scene, double substep_s)
@@ -265,9 +308,11 @@ void BulletWorld::ReadStates() {
 void BulletWorld::SetState(std::size_t body, const BodyState& state) {
   if (!engine_ || scene_.bodies[body].fixed) return;
   const std::size_t place = engine_->bodies.moving_of[body];
-  engine_->sleepers.Wake(place);
+  if (!engine_->sleepers.SleepsOn(place, state)) {
+    engine_->sleepers.Wake(place);
+    engine_->reached[place] = 1;  // for all that is known of it
+  }
   engine_->bodies.moving[place].SetState(state);
-  engine_->reached[place] = 1;  // for all that is known of it
   engine_->islands.UpdateBox(place);
   states_[body] = state;
 }
@@ -288,9 +333,9 @@ void BulletWorld::Play(std::span<const Stretch> stretches) {
 
 bool BulletWorld::FindContacts(std::size_t body, double reach_m,
                                std::vector<ContactSite>& sites) const {
-  if (!engine_ || scene_.bodies[body].fixed || IsJointed(scene_, body)) return false;
+  if (!engine_ || scene_.bodies[body].fixed) return false;
   const std::size_t place = engine_->bodies.moving_of[body];
-  const std::vector<std::size_t> others = engine_->islands.Near(place, reach_m);
+  const std::vector<std::size_t> others = engine_->islands.NearTo(place, reach_m);
   const std::size_t first = sites.size();
   if (!site_finder_.Find(states_, body, reach_m, others, sites)) return false;
   const std::span<ContactSite> found = std::span(sites).subspan(first);

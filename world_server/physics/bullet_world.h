@@ -6,10 +6,10 @@
 // fall and the flight after a kick are exact, stacks of ten 5 cm boxes and mass ratios up to 1:300
 // hold. Combined friction is sqrt(mu1 mu2). Repeatable to the bit for the same scene and calls.
 //
-// What it costs grows with what is awake, not with what is there. Time passes in windows of at most 10 ms,
-// in which bodies that could meet are stepped together (islands.h) and those that rest sleep (sleep.h). In
-// Play a group that a push reaches takes the scene's substep, the others longer ones (substep_choice.h);
-// ApplyAndStep takes the scene's substep everywhere.
+// What it costs grows with what is awake, not with what is there. Time passes in windows of at most
+// 10 ms, shorter where something is fast, in which bodies that could meet are stepped together
+// (islands.h) and those that rest sleep (sleep.h). In Play a group that a push reaches takes the scene's
+// substep, the others longer ones (substep_choice.h); ApplyAndStep takes the scene's substep everywhere.
 #pragma once
 
 #include <memory>

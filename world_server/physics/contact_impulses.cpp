@@ -44,7 +44,8 @@ void AddImpulses(const MovingBody& body, const Pose& pose_WB, std::span<ContactP
         if (nearest == nullptr) continue;
         nearest->impulse +=
             side * (point.m_appliedImpulse * FromBullet(point.m_normalWorldOnB) +
-                    point.m_appliedImpulseLateral1 * FromBullet(point.m_lateralFrictionDir1));
+                    point.m_appliedImpulseLateral1 * FromBullet(point.m_lateralFrictionDir1) +
+                    point.m_appliedImpulseLateral2 * FromBullet(point.m_lateralFrictionDir2));
       }
     }
   }

@@ -23,13 +23,16 @@ ContactPairs::Key ContactPairs::KeyOf(const btCollisionObject& a, const btCollis
   return std::minmax({a.getUserIndex3(), b.getUserIndex3()});
 }
 
-ContactPair* ContactPairs::Plan(btRigidBody& a, btRigidBody& b, std::uint64_t plan) {
+bool ContactPairs::MayMeet(const btRigidBody& a, const btRigidBody& b) {
   const btBroadphaseProxy& proxy_a = *a.getBroadphaseHandle();
   const btBroadphaseProxy& proxy_b = *b.getBroadphaseHandle();
-  const bool may_meet = (proxy_a.m_collisionFilterGroup & proxy_b.m_collisionFilterMask) != 0 &&
-                        (proxy_b.m_collisionFilterGroup & proxy_a.m_collisionFilterMask) != 0 &&
-                        a.checkCollideWith(&b) && b.checkCollideWith(&a);
-  if (!may_meet) return nullptr;
+  return (proxy_a.m_collisionFilterGroup & proxy_b.m_collisionFilterMask) != 0 &&
+         (proxy_b.m_collisionFilterGroup & proxy_a.m_collisionFilterMask) != 0 &&
+         a.checkCollideWith(&b) && b.checkCollideWith(&a);
+}
+
+ContactPair* ContactPairs::Plan(btRigidBody& a, btRigidBody& b, std::uint64_t plan) {
+  if (!MayMeet(a, b)) return nullptr;
   const auto [place, is_new] = pairs_.try_emplace(KeyOf(a, b));
   ContactPair& pair = place->second;
   if (is_new) {

@@ -38,8 +38,11 @@ class ContactPairs {
   ContactPairs(const ContactPairs&) = delete;
   ContactPairs& operator=(const ContactPairs&) = delete;
 
-  /// Marks the pair as part of plan number `plan`, and makes it if it is new. Null for two that must
-  /// not meet (a joint says so). Valid until it is dropped.
+  /// False where a joint keeps them from each other.
+  static bool MayMeet(const btRigidBody& a, const btRigidBody& b);
+
+  /// Marks the pair as part of plan number `plan`, and makes it if it is new. Null for two that may
+  /// not meet. Valid until it is dropped.
   ContactPair* Plan(btRigidBody& a, btRigidBody& b, std::uint64_t plan);
 
   /// Forgets the pairs of a moving body that are not in `plan`.

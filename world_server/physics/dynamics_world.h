@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,20 @@ struct PlacedImpulse {
   std::size_t body = 0;
   Vec3 impulse = Vec3::Zero();          // N s, in W
   Vec3 angular_impulse = Vec3::Zero();  // N m s, about the world origin, in W
+  std::optional<Vec3> point = {};       // m, where it acted, if that is known, in W
 };
+
+/// What has gone away from where it was pushed is pushed at its nearest place, within `reach_m` of its
+/// centre: as long as its lever was, the impulse would be a torque that no contact with the body has.
+inline PlacedImpulse WithinReach(PlacedImpulse push, const Vec3& centre, double reach_m) {
+  if (!push.point) return push;
+  const Vec3 lever = *push.point - centre;
+  const double length = lever.norm();
+  if (!(length > reach_m)) return push;
+  push.angular_impulse += (reach_m / length - 1) * lever.cross(push.impulse);
+  *push.point = centre + reach_m / length * lever;
+  return push;
+}
 
 /// The push as a kick of a body whose centre of mass c is there [m, in W]: L_c = L - c x J.
 inline Kick KickOf(const PlacedImpulse& push, const Vec3& centre) {
@@ -43,6 +57,8 @@ struct Stretch {
 
 /// Where a body touches, or may soon touch, another: a point of the body and a plane of the other.
 struct ContactSite {
+  static constexpr std::size_t kNobody = static_cast<std::size_t>(-1);  // a joint to the world
+
   std::size_t other = 0;
   Vec3 p_B = Vec3::Zero();             // m, in the body's frame; the centre of a rounding
   double radius = 0;                   // m, of the rounding: contact is at p_B - radius * normal

@@ -9,7 +9,7 @@ namespace rikiseki::world {
 namespace {
 
 constexpr double kMargin = 1e-3;  // m
-constexpr double kSpare = 1.5;
+constexpr double kSpare = 2;  // what is hit by something heavier, and bounces, is that much faster
 constexpr std::size_t kNoGroup = static_cast<std::size_t>(-1);
 constexpr double kTooLarge = 1e12;  // m^2
 
@@ -89,9 +89,14 @@ void Islands::AddAlone(std::size_t body) {
   parents_[body] = body;
   numbers_[body] = kNoGroup;
   asked_[body] = -1;
-  reaches_[body] = sleepers_.Sleeps(body) ? 0 : kSpare * window_s_ * SpeedOf(body);
   members_.push_back(body);
-  to_ask_.push_back(body);
+  SetReach(body, sleepers_.Sleeps(body) ? 0 : kSpare * window_s_ * SpeedOf(body));
+}
+
+void Islands::SetReach(std::size_t body, double reach_m) {
+  reaches_[body] = reach_m;
+  to_ask_.emplace_back(reach_m, body);
+  std::push_heap(to_ask_.begin(), to_ask_.end());
 }
 
 void Islands::Add(std::size_t body) {
@@ -108,18 +113,17 @@ void Islands::Add(std::size_t body) {
 // What `body` may set in motion after a gap comes so much less far.
 void Islands::Reach(std::size_t body, std::size_t other, double gap_m) {
   Add(other);
-  Unite(body, other);
   const double left = reaches_[body] - gap_m;
-  if (left <= reaches_[other]) return;
-  reaches_[other] = left;
-  to_ask_.push_back(other);
+  if (left > reaches_[other]) SetReach(other, left);
 }
 
 void Islands::AskJoined(std::size_t body) {
   for (const btTypedConstraint* joint : joints_of_[body]) {
     for (const btRigidBody* rigid : {&joint->getRigidBodyA(), &joint->getRigidBodyB()}) {
       const int other = rigid->getUserIndex();
-      if (other >= 0) Reach(body, static_cast<std::size_t>(other), 0);
+      if (other < 0) continue;
+      Reach(body, static_cast<std::size_t>(other), 0);
+      Unite(body, static_cast<std::size_t>(other));
     }
   }
 }
@@ -130,32 +134,52 @@ void Islands::Unite(std::size_t a, std::size_t b) {
   parents_[std::max(root, other)] = std::min(root, other);
 }
 
-// Others whose boxes are that near.
-std::vector<btRigidBody*> Islands::Overlapping(const btRigidBody& rigid, double reach_m) {
+// Others whose boxes are that near, until the next call.
+std::span<btRigidBody* const> Islands::Overlapping(const btRigidBody& rigid, double reach_m) {
   const btBroadphaseProxy& proxy = *rigid.getBroadphaseHandle();
   const btVector3 reach(reach_m, reach_m, reach_m);
   const btVector3 low = proxy.m_aabbMin - reach;
   const btVector3 high = proxy.m_aabbMax + reach;
-  std::vector<btRigidBody*> found;
-  Overlaps overlaps(low, high, found);
+  overlapping_.clear();
+  Overlaps overlaps(low, high, overlapping_);
   broadphase_.aabbTest(low, high, overlaps);
-  std::erase(found, &rigid);
-  return found;
+  std::erase(overlapping_, &rigid);
+  return overlapping_;
 }
 
-void Islands::Ask(std::size_t body, double reach_m) {
-  btRigidBody& rigid = *bodies_.moving[body].rigid;
-  for (btRigidBody* other : Overlapping(rigid, reach_m)) {
-    ContactPair* pair = pairs_.Plan(rigid, *other, plan_);
-    if (pair == nullptr) continue;
-    planned_.push_back(pair);
-    if (other->getUserIndex() < 0) continue;
-    Reach(body, static_cast<std::size_t>(other->getUserIndex()),
-          Apart(*rigid.getBroadphaseHandle(), *other->getBroadphaseHandle()));
+// Whom it may hit, and whoever comes to meet it: that one reaches no farther, or is asked itself.
+void Islands::Ask(std::size_t body) {
+  const btRigidBody& rigid = *bodies_.moving[body].rigid;
+  const double way = reaches_[body] + kMargin;
+  for (btRigidBody* other : Overlapping(rigid, reaches_[body] + way)) {
+    const double gap = Apart(*rigid.getBroadphaseHandle(), *other->getBroadphaseHandle());
+    near_.push_back({body, other, gap});
+    const int place = other->getUserIndex();
+    if (place < 0 || gap > way || !ContactPairs::MayMeet(rigid, *other)) continue;
+    Reach(body, static_cast<std::size_t>(place), gap);
   }
 }
 
-std::vector<std::size_t> Islands::Near(std::size_t body, double reach_m) {
+// Once it is known how far both may come.
+void Islands::PlanPair(const Near& near) {
+  double reach = reaches_[near.body] + kMargin;
+  const int place = near.other->getUserIndex();
+  if (place >= 0) {
+    const auto other = static_cast<std::size_t>(place);
+    if (plan_of_[other] == plan_) {
+      // Told by the one that looked farther.
+      if (std::pair(asked_[other], near.body) > std::pair(asked_[near.body], other)) return;
+      reach += reaches_[other];
+    }
+  }
+  if (near.gap_m > reach) return;
+  ContactPair* pair = pairs_.Plan(*bodies_.moving[near.body].rigid, *near.other, plan_);
+  if (pair == nullptr) return;
+  planned_.push_back(pair);
+  if (place >= 0) Unite(near.body, static_cast<std::size_t>(place));
+}
+
+std::vector<std::size_t> Islands::NearTo(std::size_t body, double reach_m) {
   std::vector<std::size_t> near;
   for (const btRigidBody* other : Overlapping(*bodies_.moving[body].rigid, reach_m)) {
     near.push_back(static_cast<std::size_t>(other->getUserIndex2()));
@@ -182,17 +206,20 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
   members_.clear();
   to_ask_.clear();
   planned_.clear();
+  near_.clear();
   for (const std::size_t body : sleepers_.awake()) UpdateBox(body);
   for (const std::size_t body : sleepers_.awake()) Add(body);
   while (!to_ask_.empty()) {
-    const std::size_t body = to_ask_.back();
+    // Who reaches farthest first: what others may make of it is known by then, and nobody asks twice.
+    std::pop_heap(to_ask_.begin(), to_ask_.end());
+    const std::size_t body = to_ask_.back().second;
     to_ask_.pop_back();
     if (asked_[body] >= reaches_[body]) continue;
     asked_[body] = reaches_[body];
     AskJoined(body);
-    // Twice the way: whoever comes to meet it reaches no farther, or asks itself.
-    if (contacts_) Ask(body, 2 * reaches_[body] + kMargin);
+    if (contacts_) Ask(body);
   }
+  for (const Near& near : near_) PlanPair(near);
 
   std::sort(members_.begin(), members_.end());
   std::size_t count = 0;
@@ -203,7 +230,7 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
     if (numbers_[root] == kNoGroup) {
       numbers_[root] = count;
       if (groups_.size() == count) groups_.emplace_back();
-      groups_[count] = {};
+      groups_[count].Clear();
       ++count;
     }
     group_of_[body] = numbers_[root];
@@ -218,7 +245,6 @@ std::span<Group> Islands::Plan(double window_s, std::span<const double> pushed_s
   }
   std::sort(planned_.begin(), planned_.end(),
             [](const ContactPair* a, const ContactPair* b) { return a->Order() < b->Order(); });
-  planned_.erase(std::unique(planned_.begin(), planned_.end()), planned_.end());
   for (ContactPair* pair : planned_) {
     const int place = std::max(pair->first_moving(), pair->second_moving());
     groups_[group_of_[static_cast<std::size_t>(place)]].pairs.push_back(pair);

@@ -1,15 +1,15 @@
 // Who could meet whom within a short window of time. Bodies that could are one group; groups know nothing
 // of each other until the window has passed, so that each may be stepped alone and in its own steps.
 //
-// A body reaches as far as its speed carries it, pushes of the window included and half as much again; whom
-// it may hit, as far as is left of that after the gap. A sleeping island within reach is part of the group,
-// asleep. All
-// follows from numbers and places, never from addresses.
+// A body reaches as far as twice its speed carries it, pushes of the window included; whom it may hit,
+// as far as is left of that after the gap. Two meet if their reaches do. A sleeping island within reach
+// is part of the group, asleep. All follows from numbers and places, never from addresses.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "world_server/physics/bullet_bodies.h"
@@ -22,6 +22,12 @@ struct Group {
   std::vector<std::size_t> members;        // places in BulletBodies::moving, ascending
   std::vector<ContactPair*> pairs;         // that could meet, in the order of their numbers
   std::vector<btTypedConstraint*> joints;  // of the members
+
+  void Clear() {
+    members.clear();
+    pairs.clear();
+    joints.clear();
+  }
 };
 
 class Islands {
@@ -38,21 +44,30 @@ class Islands {
   void UpdateBox(std::size_t body);
   /// The scene's bodies that may be within `reach_m` of a moving body where it was at UpdateBox, itself
   /// excluded; ascending.
-  std::vector<std::size_t> Near(std::size_t body, double reach_m);
+  std::vector<std::size_t> NearTo(std::size_t body, double reach_m);
 
-  /// The place among the last plan.s groups of a body that is in it.
+  /// The place among the last plan's groups of a body that is in it.
   std::size_t GroupOf(std::size_t body) const { return group_of_[body]; }
 
  private:
+  // Two that may come near each other.
+  struct Near {
+    std::size_t body = 0;
+    btRigidBody* other = nullptr;
+    double gap_m = 0;
+  };
+
   void KnowJoints();
   void Add(std::size_t body);  // with all that sleep with it
   void AddAlone(std::size_t body);
+  void SetReach(std::size_t body, double reach_m);
   void Reach(std::size_t body, std::size_t other, double gap_m);
   void AskJoined(std::size_t body);
   void Unite(std::size_t a, std::size_t b);
   std::size_t RootOf(std::size_t body);
-  void Ask(std::size_t body, double reach_m);
-  std::vector<btRigidBody*> Overlapping(const btRigidBody& rigid, double reach_m);
+  void Ask(std::size_t body);
+  void PlanPair(const Near& near);
+  std::span<btRigidBody* const> Overlapping(const btRigidBody& rigid, double reach_m);
   double SpeedOf(std::size_t body) const;
 
   BulletBodies& bodies_;
@@ -73,7 +88,9 @@ class Islands {
   std::vector<double> reaches_;       // m, how far each may come, or send others
   std::vector<double> asked_;         // m, the reach with which it was asked; -1 = not yet
   std::vector<std::size_t> members_;  // of the plan
-  std::vector<std::size_t> to_ask_;
+  std::vector<std::pair<double, std::size_t>> to_ask_;  // a heap, by reach
+  std::vector<Near> near_;
+  std::vector<btRigidBody*> overlapping_;
   std::vector<ContactPair*> planned_;
   std::vector<std::size_t> numbers_;  // of roots: that of the group
   std::vector<std::size_t> group_of_;

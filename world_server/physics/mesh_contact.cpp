@@ -200,8 +200,9 @@ std::vector<ContactPoint> FindMeshContact(const Solid& first, const Pose& pose_W
   const PlacedConvex convex(first, pose_MF);
   const Ball ball = OuterBall(first.shape);
   MeshContact contact(convex, mesh, 2 * ball.radius, reach_m);
-  mesh.tree().VisitNear(pose_MF * ball.centre, ball.radius + reach_m,
-                        [&](std::uint32_t face) { contact.Look(face); });
+  mesh.tree().VisitNear(
+      pose_MF * ball.centre, ball.radius + reach_m, [](std::uint32_t) { return true; },
+      [&](std::uint32_t place) { contact.Look(mesh.tree().items()[place]); });
   std::vector<ContactPoint> points = contact.Take();
   PutInWorld(pose_WM, points);
   return points;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <utility>
 
 #include "world_server/physics/bullet_math.h"
 
@@ -12,6 +13,16 @@ namespace {
 constexpr double kStays = 2.5e-5;    // m, so near is where it was
 constexpr double kSettling = 0.5;    // s, so long
 constexpr double kTrembling = 0.01;  // m/s, no faster meanwhile
+// Sooner where it is slower than could leave that place in that time: what is about to move, by 1e-3 m/s^2
+// or more, is faster by then. A scene that begins at rest sleeps before its first tick is over.
+constexpr double kStill = 2e-5;       // m/s
+constexpr double kStillFor = 0.0295;  // s, three windows
+
+// m, of any point of a body.
+double WayBetween(const Pose& from, const Pose& to, double outer_radius) {
+  return (to.position - from.position).norm() +
+         outer_radius * to.orientation.angularDistance(from.orientation);
+}
 
 }  // namespace
 
@@ -26,9 +37,21 @@ Sleepers::Sleepers(std::vector<MovingBody>& moving, bool may_sleep)
   std::iota(awake_.begin(), awake_.end(), std::size_t{0});
 }
 
+// All who fell asleep in a window at once.
+void Sleepers::TakeOutSleepers() {
+  if (!std::exchange(some_fell_asleep_, false)) return;
+  std::erase_if(awake_, [this](std::size_t body) { return Sleeps(body); });
+}
+
+std::span<const std::size_t> Sleepers::awake() {
+  TakeOutSleepers();
+  return awake_;
+}
+
 void Sleepers::Wake(std::size_t body) {
   const std::size_t island = island_of_[body];
   if (island == kAwake) return;
+  TakeOutSleepers();  // else one that wakes would stand there twice
   for (const std::size_t mate : islands_[island]) {
     island_of_[mate] = kAwake;
     rests_[mate] = {};
@@ -39,23 +62,31 @@ void Sleepers::Wake(std::size_t body) {
   free_islands_.push_back(island);
 }
 
+bool Sleepers::SleepsOn(std::size_t body, const BodyState& state) const {
+  if (!Sleeps(body) || !state.velocity.isZero(0) || !state.angular_velocity.isZero(0)) return false;
+  return WayBetween(moving_[body].State().pose, state.pose, moving_[body].outer_radius) <= kStays;
+}
+
 std::size_t Sleepers::RootOf(std::size_t body) {
   while (parents_[body] != body) body = parents_[body] = parents_[parents_[body]];
   return body;
 }
 
 void Sleepers::WatchOne(std::size_t body, double time_s) {
-  const btTransform& pose = moving_[body].rigid->getWorldTransform();
-  const Vec3 position = FromBullet(pose.getOrigin());
-  const Quat orientation = FromBullet(pose.getRotation());
+  const Pose pose = FromBullet(moving_[body].rigid->getWorldTransform());
+  const double speed = moving_[body].Speed();
   Rest& rest = rests_[body];
-  const double way = (position - rest.position).norm() +
-                     moving_[body].outer_radius * orientation.angularDistance(rest.orientation);
-  if (way <= kStays && moving_[body].Speed() <= kTrembling) {
-    rest.time_s += time_s;
-  } else {
-    rest = {.position = position, .orientation = orientation};
+  const double way = WayBetween(rest.pose, pose, moving_[body].outer_radius);
+  if (!(way <= kStays && speed <= kTrembling)) {
+    rest = {.pose = pose};
+    return;
   }
+  rest.time_s += time_s;
+  rest.still_s = speed <= kStill ? rest.still_s + time_s : 0;
+}
+
+bool Sleepers::HasRested(std::size_t body) const {
+  return rests_[body].time_s >= kSettling || rests_[body].still_s >= kStillFor;
 }
 
 void Sleepers::Watch(std::span<const std::size_t> members, std::span<ContactPair* const> pairs,
@@ -66,7 +97,7 @@ void Sleepers::Watch(std::span<const std::size_t> members, std::span<ContactPair
   for (const std::size_t body : members) {
     if (Sleeps(body)) continue;
     WatchOne(body, time_s);
-    some_rest = some_rest || rests_[body].time_s >= kSettling;
+    some_rest = some_rest || HasRested(body);
     parents_[body] = body;
   }
   if (!some_rest) return;
@@ -101,8 +132,7 @@ void Sleepers::Watch(std::span<const std::size_t> members, std::span<ContactPair
   for (const auto& [root, bodies] : islands) {
     const bool held = held_[root] != 0;
     const bool rests = std::all_of(bodies.begin(), bodies.end(), [&](std::size_t body) {
-      return rests_[body].time_s >= kSettling && pushed[body] == 0 &&
-             (held || moving_[body].Speed() == 0);
+      return HasRested(body) && pushed[body] == 0 && (held || moving_[body].Speed() == 0);
     });
     if (rests) PutToSleep(bodies);
   }
@@ -124,7 +154,7 @@ void Sleepers::PutToSleep(const std::vector<std::size_t>& bodies) {
     rigid.setAngularVelocity(btVector3(0, 0, 0));
     rigid.forceActivationState(ISLAND_SLEEPING);
   }
-  std::erase_if(awake_, [this](std::size_t body) { return Sleeps(body); });
+  some_fell_asleep_ = true;
 }
 
 }  // namespace rikiseki::world

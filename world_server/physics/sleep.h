@@ -25,7 +25,7 @@ class Sleepers {
 
   bool Sleeps(std::size_t body) const { return island_of_[body] != kAwake; }
   /// Who is awake, by their places in `moving`, ascending.
-  std::span<const std::size_t> awake() const { return awake_; }
+  std::span<const std::size_t> awake();
   /// All that sleep with this sleeping body, itself included.
   std::span<const std::size_t> IslandOf(std::size_t body) const {
     return islands_[island_of_[body]];
@@ -33,6 +33,10 @@ class Sleepers {
 
   /// Wakes the body's island, if it sleeps.
   void Wake(std::size_t body);
+
+  /// Whether a sleeping body that is put there sleeps on: at rest, and where it is but for what a sleeper
+  /// may have trembled.
+  bool SleepsOn(std::size_t body, const BodyState& state) const;
 
   /// After `time_s` of a group that met nobody else: lets fall asleep what has rested long enough and is not
   /// `pushed` (by place in `moving`). What floats freely sleeps only if it does not move at all.
@@ -44,18 +48,21 @@ class Sleepers {
   static constexpr std::size_t kAwake = static_cast<std::size_t>(-1);
 
   struct Rest {
-    Vec3 position = Vec3::Zero();  // since then it has stayed near here
-    Quat orientation = Quat::Identity();
+    Pose pose;  // since then it has stayed near here
     double time_s = 0;
+    double still_s = 0;  // and has hardly moved at all
   };
 
+  void TakeOutSleepers();
   std::size_t RootOf(std::size_t body);
   void WatchOne(std::size_t body, double time_s);
+  bool HasRested(std::size_t body) const;
   void PutToSleep(const std::vector<std::size_t>& bodies);
 
   std::vector<MovingBody>& moving_;
   bool may_sleep_;
-  std::vector<std::size_t> awake_;
+  std::vector<std::size_t> awake_;  // and some who fell asleep since
+  bool some_fell_asleep_ = false;
   std::vector<std::size_t> island_of_;  // place in islands_, or kAwake
   std::vector<std::vector<std::size_t>> islands_;
   std::vector<std::size_t> free_islands_;

@@ -25,19 +25,6 @@ double PerSecond(double rate, double most) {
   return rate > 0 ? most / rate : std::numeric_limits<double>::infinity();
 }
 
-// By our own routines (bullet_contacts.h), and of anything round on a half-space.
-bool IsFoundAhead(const ContactPair& pair) {
-  const int first = pair.first->getCollisionShape()->getShapeType();
-  const int second = pair.second->getCollisionShape()->getShapeType();
-  if (first == STATIC_PLANE_PROXYTYPE || second == STATIC_PLANE_PROXYTYPE) return true;
-  const auto has_faces = [](int shape) {
-    return shape == BOX_SHAPE_PROXYTYPE || shape == CYLINDER_SHAPE_PROXYTYPE ||
-           shape == CONVEX_HULL_SHAPE_PROXYTYPE;
-  };
-  return (first == BOX_SHAPE_PROXYTYPE && has_faces(second)) ||
-         (second == BOX_SHAPE_PROXYTYPE && has_faces(first));
-}
-
 // Ten boxes of size L stand at 0.03 sqrt(L/g), 2 ms for 5 cm.
 double StackSubstep(const GroupMotion& motion) {
   if (!motion.meets_moving || !(motion.gravity > 0)) return std::numeric_limits<double>::infinity();
@@ -79,7 +66,6 @@ GroupMotion MotionOf(const Group& group, const BulletBodies& bodies, const Sleep
   for (const ContactPair* pair : group.pairs) {
     join(*pair->first, *pair->second);
     const auto [first, second] = pair->Order();
-    motion.meets_late = motion.meets_late || !IsFoundAhead(*pair);
     motion.rebounds =
         motion.rebounds || bodies.restitutions[static_cast<std::size_t>(first)] *
                                    bodies.restitutions[static_cast<std::size_t>(second)] >
@@ -105,7 +91,7 @@ double CoarseSubstep(const GroupMotion& motion, double substep_s, double window_
   const double pushed = PushedSubstep(motion, substep_s);
   double coarse = std::min(
       {window_s, PerSecond(motion.turning, kMostTurn), PerSecond(motion.drag, kMostDragging)});
-  if (motion.rebounds || motion.meets_late) return pushed;
+  if (motion.rebounds) return pushed;
   if (motion.meets) {
     const double height = std::min(static_cast<double>(motion.awake), kHighStack) / kHighStack;
     const double touching = motion.speed < kResting ? window_s : kLongestTouching;

@@ -16,7 +16,6 @@ struct GroupMotion {
   bool meets = false;         // something could be met
   bool meets_moving = false;  // ... that can move itself, or a joint holds two
   bool rebounds = false;      // restitution
-  bool meets_late = false;    // contacts that are found only when two have met already
   double smallest = 0;        // m, least inner diameter of those that could meet each other
   double mass_ratio = 1;      // heaviest / lightest of them, >= 1
   double turning = 0;         // rad/s, the fastest

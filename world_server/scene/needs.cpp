@@ -42,16 +42,13 @@ SceneNeeds WorkOutNeeds(const Scene& scene, const SceneUse& use) {
   bool drag = false;
   bool precesses = false;
   bool rubs_finger = false;
-  bool copies = false;
-  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
-    const SceneBody& body = scene.bodies[i];
+  for (const SceneBody& body : scene.bodies) {
     for (const Collider& collider : body.colliders) {
       rubs_finger = rubs_finger || use.finger_friction * collider.friction > 0;
     }
     deforms = deforms || body.softness;
     if (body.fixed || body.softness) continue;
     ++moving;
-    copies = copies || !IsJointed(scene, i);  // what is jointed has no copy
     drag = drag || AirDrag::On(body).acts();
     precesses = precesses || !BodyInertia::Of(body.mass_kg, body.inertia).isotropic;
   }
@@ -68,7 +65,7 @@ SceneNeeds WorkOutNeeds(const Scene& scene, const SceneUse& use) {
   sort(drag, protocol::kNeedDrag);
   sort(meets, protocol::kNeedFastBodies);
   sort(deforms, protocol::kNeedDeformation);
-  sort(copies && use.coupling == protocol::Coupling::kLocal, protocol::kNeedLocalBodies);
+  sort(moving > 0 && use.coupling == protocol::Coupling::kLocal, protocol::kNeedLocalBodies);
   return found;
 }
 

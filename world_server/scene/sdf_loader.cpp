@@ -2,132 +2,34 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
-#include <mutex>
-#include <regex>
 #include <sdf/sdf.hh>
 #include <set>
-#include <sstream>
 
 #include "common/config.h"
 #include "protocol/messages.h"
+#include "world_server/scene/sdf_complaints.h"
 #include "world_server/scene/sdf_element.h"
 #include "world_server/scene/sdf_extensions.h"
 #include "world_server/scene/sdf_joint.h"
+#include "world_server/scene/sdf_link.h"
 #include "world_server/scene/sdf_mesh.h"
 #include "world_server/scene/sdf_surface.h"
 #include "world_server/scene/sdf_survey.h"
+#include "world_server/scene/sdf_trimmed.h"
 
 namespace rikiseki::world {
 namespace {
 
-// libsdformat and the URDF parser behind it write to std::cerr what their error objects do not
-// hold. Collects it, so that a refusal stays one line and still gives the reason. There is one
-// std::cerr, so threads that load scenes do it one after the other.
-class CaptureStandardError {
- public:
-  CaptureStandardError() : before_(std::cerr.rdbuf(text_.rdbuf())) {}
-  ~CaptureStandardError() { std::cerr.rdbuf(before_); }
-  CaptureStandardError(const CaptureStandardError&) = delete;
-  CaptureStandardError& operator=(const CaptureStandardError&) = delete;
-
-  // What libsdformat said at this level ("Error" or "Warning"), one entry for each message.
-  std::vector<std::string> Messages(const std::string& level) const {
-    const std::regex colour("\x1b\\[[0-9;]*m");
-    const std::regex prefix("^" + level + " \\[[^\\]]*\\]\\s*");
-    std::istringstream lines(text_.str());
-    std::vector<std::string> messages;
-    for (std::string line; std::getline(lines, line);) {
-      line = std::regex_replace(line, colour, "");
-      std::smatch match;
-      if (std::regex_search(line, match, prefix)) messages.push_back(match.suffix());
-    }
-    return messages;
-  }
-
- private:
-  static inline std::mutex only_one_;
-  std::lock_guard<std::mutex> lock_{only_one_};
-  std::ostringstream text_;
-  std::streambuf* before_;
-};
-
-std::string OneLine(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  while (!text.empty() && (text.back() == ' ' || text.back() == '.')) text.pop_back();
-  return text;
-}
-
-// The line of the last element that fits, or 0.
-template <typename Fits>
-int LastLine(const sdf::ElementPtr& element, const Fits& fits) {
-  int line = fits(element) ? element->LineNumber().value_or(0) : 0;
-  for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
-    line = std::max(line, LastLine(child, fits));
-  }
-  return line;
-}
-
-// ":line" of what a message is about, as far as it can be told: libsdformat knows no line for what
-// it finds out late. Most messages give a name, in brackets or after "named".
-std::string LineOf(const std::string& message, const sdf::ElementPtr& root) {
-  if (!root) return "";
-  const std::regex quoted("\\[([^\\]]+)\\]|named ([^ ]+)");
-  for (std::sregex_iterator match(message.begin(), message.end(), quoted), end; match != end;
-       ++match) {
-    const std::string name = (*match)[1].matched ? (*match)[1] : (*match)[2];
-    const int line = LastLine(root, [&](const sdf::ElementPtr& element) {
-      return element->HasAttribute("name") && element->Get<std::string>("name") == name;
-    });
-    if (line > 0) return ":" + std::to_string(line);
-  }
-  if (message.starts_with("A model must have at least one link")) {
-    const int line = LastLine(root, [](const sdf::ElementPtr& element) {
-      return element->GetName() == "model" && !element->HasElement("link") &&
-             !element->HasElement("model");
-    });
-    if (line > 0) return ":" + std::to_string(line);
-  }
-  return "";
-}
-
-// The first thing that libsdformat disliked, in one line.
-void RefuseErrors(const std::string& path, const sdf::Root& root, const sdf::Errors& errors,
-                  const std::vector<std::string>& said) {
-  if (errors.empty() && said.empty()) return;
-  std::string place = path;
-  std::string why = said.empty() ? "" : OneLine(said.front());
-  std::smatch match;
-  if (!errors.empty() && errors.front().LineNumber()) {
-    const sdf::Error& first = errors.front();
-    place = first.FilePath().value_or(path) + ":" + std::to_string(*first.LineNumber());
-    why = OneLine(first.Message()) + (why.empty() ? "" : ": " + why);
-    const std::regex unknown("XML Element\\[(.+)\\], child of element\\[(.+)\\], not defined.*");
-    if (std::regex_match(why, match, unknown)) {
-      why = "SDFormat has no <" + match[1].str() + "> in <" + match[2].str() +
-            ">: correct or remove it";
-    }
-  } else if (std::regex_search(why, match, std::regex("Error=(\\w+).*Line number=(\\d+)(.*)"))) {
-    if (match[2] != "0") place += ":" + match[2].str();
-    why = "broken XML, " + match[1].str() + match[3].str();
-  } else if (why.empty()) {
-    why = OneLine(errors.front().Message());
-    place += LineOf(why, root.Element());
-    if (errors.front().Code() == sdf::ErrorCode::FILE_READ) why = "this is not an SDFormat file";
-  }
-  throw ConfigError(place + ": " + why + "; an SDFormat world (sdformat.org) is expected");
-}
-
-Pose Resolve(const sdf::SemanticPose& semantic, const sdf::ElementPtr& element) {
-  ignition::math::Pose3d pose;
-  const sdf::Errors errors = semantic.Resolve(pose);
-  if (!errors.empty()) Refuse(element, OneLine(errors.front().Message()));
-  if (!pose.IsFinite()) Refuse(element, "a pose of finite numbers is expected");
-  return FromSdf(pose);
+// False where there is anything to say.
+bool LoadQuietly(const std::string& path, const sdf::ParserConfig& config, sdf::Root& root) {
+  const CaptureStandardError captured;
+  sdf::Root quiet;
+  if (!LoadTrimmed(path, config, quiet) || !captured.empty()) return false;
+  root = std::move(quiet);
+  return true;
 }
 
 // The engine knows one friction and one restitution for a body that moves.
@@ -142,92 +44,6 @@ void RequireSameSurface(const sdf::Collision& collision, const std::string& link
   };
   require(collider.friction, first.friction, "friction");
   require(collider.restitution, first.restitution, "restitution");
-}
-
-Shape ReadPrimitive(const sdf::Collision& collision) {
-  const sdf::Geometry& geometry = *collision.Geom();
-  const sdf::ElementPtr at = collision.Element()->HasElement("geometry")
-                                 ? collision.Element()->GetElement("geometry")
-                                 : collision.Element();
-  switch (geometry.Type()) {
-    case sdf::GeometryType::BOX: {
-      const Vec3 size = FromSdf(geometry.BoxShape()->Size());
-      for (const double edge : size) Positive(at, "an edge of the box", edge);
-      return Box{size / 2};
-    }
-    case sdf::GeometryType::SPHERE:
-      return Sphere{Positive(at, "the radius", geometry.SphereShape()->Radius())};
-    case sdf::GeometryType::PLANE: {
-      const Vec3 normal = FromSdf(geometry.PlaneShape()->Normal());
-      Positive(at, "the length of the normal", normal.norm());
-      return HalfSpace{normal.normalized()};
-    }
-    case sdf::GeometryType::CYLINDER: {
-      const sdf::Cylinder& cylinder = *geometry.CylinderShape();
-      return Cylinder{Positive(at, "the radius", cylinder.Radius()),
-                      Positive(at, "the length", cylinder.Length()) / 2};
-    }
-    case sdf::GeometryType::CAPSULE: {
-      const sdf::Capsule& capsule = *geometry.CapsuleShape();
-      return Capsule{Positive(at, "the radius", capsule.Radius()),
-                     Positive(at, "the length", capsule.Length()) / 2};
-    }
-    case sdf::GeometryType::ELLIPSOID: {
-      const Vec3 radii = FromSdf(geometry.EllipsoidShape()->Radii());
-      for (const double radius : radii) Positive(at, "a radius", radius);
-      return Ellipsoid{radii};
-    }
-    default:
-      Refuse(at,
-             "a collision may be a box, sphere, plane, cylinder, capsule, ellipsoid or mesh; give "
-             "a heightmap or polyline as a mesh (OBJ, STL or DAE)");
-  }
-}
-
-void ReadInertia(const sdf::Link& link, SceneBody& body, std::vector<std::string>& warnings) {
-  const auto mass = FindExplicit(link.Element(), {"inertial", "mass"});
-  const sdf::ElementPtr at = mass ? mass : link.Element();
-  if (!FindExplicit(link.Element(), {"inertial"})) {
-    warnings.push_back(PlaceOf(at) + ": link " + body.name +
-                       " has no <inertial>: SDF's default, 1 kg and 1 kg m^2, is used");
-  }
-  const auto& matrix = link.Inertial().MassMatrix();
-  body.mass_kg = Positive(at, "the mass of link " + body.name, matrix.Mass());
-  if (!matrix.IsPositive() || !matrix.IsValid()) {
-    Refuse(at,
-           "the inertia of link " + body.name +
-               " belongs to no body: its principal moments must be above 0, and none larger than "
-               "the sum of the other two");
-  }
-  const auto moi = link.Inertial().Moi();  // about the centre of mass, along the link's axes
-  for (std::size_t row = 0; row < 3; ++row) {
-    for (std::size_t column = 0; column < 3; ++column) {
-      body.inertia(static_cast<int>(row), static_cast<int>(column)) = moi(row, column);
-    }
-  }
-}
-
-// What the link or its model says of the air and of gravity.
-void ReadForces(const sdf::Link& link, const sdf::Model& model, const Vec3& wind, SceneBody& body,
-                std::vector<std::string>& warnings) {
-  const auto gravity = FindExplicit(link.Element(), {"gravity"});
-  body.falls = !gravity || gravity->Get<bool>();
-  ReadLinkExtensions(link.Element(), body);
-  for (const char* name : {"linear", "angular"}) {
-    const auto decay = FindExplicit(link.Element(), {"velocity_decay", name});
-    if (decay && decay->Get<double>() != 0) {
-      warnings.push_back(PlaceOf(decay) +
-                         ": <velocity_decay> means another thing in each engine and is not used; "
-                         "<rikiseki:" +
-                         (name[0] == 'l' ? "drag" : "angular_drag") +
-                         "> of the link says it in units");
-    }
-  }
-  if (!model.EnableWind() && !link.EnableWind()) return;
-  body.wind = wind;
-  if (wind.isZero() || body.drag_ns_per_m > 0) return;
-  warnings.push_back(PlaceOf(link.Element()) + ": the wind does not act on link " + body.name +
-                     ", which has no <rikiseki:drag>");
 }
 
 class Loader {
@@ -418,7 +234,7 @@ class Loader {
 
 // The files that an element and all in it were read from.
 void AddFiles(const sdf::ElementPtr& element, std::set<std::string>& files) {
-  if (std::filesystem::is_regular_file(element->FilePath())) files.insert(element->FilePath());
+  files.insert(element->FilePath());
   for (auto child = element->GetFirstElement(); child; child = child->GetNextElement()) {
     AddFiles(child, files);
   }
@@ -437,7 +253,6 @@ LoadedScene LoadSdf(const std::string& path) {
     const int error = file ? EISDIR : errno;
     throw ConfigError(path + ": the scene cannot be read: " + std::strerror(error));
   }
-  CaptureStandardError captured;
   sdf::ParserConfig config;
   config.SetWarningsPolicy(sdf::EnforcementPolicy::ERR);
   config.SetUnrecognizedElementsPolicy(sdf::EnforcementPolicy::ERR);
@@ -447,7 +262,9 @@ LoadedScene LoadSdf(const std::string& path) {
   config.SetFindCallback([](const std::string&) { return std::string(); });
 
   sdf::Root root;
-  const sdf::Errors errors = root.Load(path, config);
+  const bool is_loaded = LoadQuietly(path, config, root);
+  CaptureStandardError captured;
+  const sdf::Errors errors = is_loaded ? sdf::Errors() : root.Load(path, config);
   RefuseErrors(path, root, errors, captured.Messages("Error"));
   if (root.WorldCount() != 1) {
     throw ConfigError(path + ": " + std::to_string(root.WorldCount()) +
@@ -473,6 +290,8 @@ LoadedScene LoadSdf(const std::string& path) {
   }
   std::set<std::string> files;
   AddFiles(root.Element(), files);
+  std::erase_if(files,
+                [](const std::string& name) { return !std::filesystem::is_regular_file(name); });
   for (const SceneBody& body : loaded.scene.bodies) {
     for (const Collider& collider : body.colliders) AddMeshFile(collider.shape, files);
   }

@@ -24,6 +24,18 @@ MappingSettings Skew() {
           .force_scale = 0.2};
 }
 
+TEST_CASE("what is put into the world comes back to the device") {
+  MappingSettings settings;
+  settings.origin_mm = Vec3(100, -20, 5);
+  settings.rotation_deg = Vec3(10, 20, -130);
+  settings.motion_scale = 3;
+  const Mapping mapping(settings);
+  const Vec3 point(0.01, -0.02, 0.03);
+  // A handful of roundings of numbers below 1.
+  CHECK((mapping.PointOnDevice(mapping.PointInWorld(point)) - point).norm() < 1e-15);
+  CHECK((mapping.VelocityOnDevice(mapping.VelocityInWorld(point)) - point).norm() < 1e-15);
+}
+
 TEST_CASE("the default mapping leaves every bit alone, whatever comes") {
   Mapping mapping(MappingSettings{});
   const double values[] = {0.0,     -0.0,   1,        -1.0 / 3,      0.1,      1e-310,   -5e300,

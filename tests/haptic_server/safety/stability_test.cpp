@@ -1,5 +1,6 @@
 #include "haptic_server/safety/stability.h"
 
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <iterator>
 
@@ -35,6 +36,33 @@ TEST_CASE("without a device damping it is the closed form in the wall's") {
           Approx(2 * beta * (2 - beta) / (2 + beta)).epsilon(1e-7));
   }
   CHECK(LargestStableStiffness({0.05, 0, 1e-3}, 2.01 * 50) == 0);
+}
+
+TEST_CASE("a force that comes late bears less: whole and broken ticks") {
+  // The best that any damping of the wall reaches without one of the device, in m/T^2: 0.686 in time,
+  // 0.1445, 0.0624, 0.0348 one, two, three ticks late.
+  const double m = 0.03;
+  const double T = 1e-3;
+  const auto best = [&](double late_ticks) {
+    double most = 0;
+    for (double beta = 0.002; beta < 1.5; beta += 0.002) {
+      const HeldMass device{m, 0, T, late_ticks * T};
+      most = std::max(most, LargestStableStiffness(device, beta * m / T) * T * T / m);
+    }
+    return most;
+  };
+  CHECK(best(1) == Approx(0.1445).epsilon(0.005));
+  CHECK(best(2) == Approx(0.0624).epsilon(0.005));
+  CHECK(best(3) == Approx(0.0348).epsilon(0.005));
+  // Next to no latency is none; between two ticks it lies between theirs.
+  const HeldMass in_time{m, 0.2, T};
+  CHECK(LargestStableStiffness({m, 0.2, T, 1e-9}, 2) ==
+        Approx(LargestStableStiffness(in_time, 2)).epsilon(1e-4));
+  const double half_late = LargestStableStiffness({m, 0.2, T, T / 2}, 2);
+  CHECK(half_late < LargestStableStiffness(in_time, 2));
+  CHECK(half_late > LargestStableStiffness({m, 0.2, T, T}, 2));
+  // The rule of Gil: K (T/2 + latency) = b + B, for little damping.
+  CHECK(LargestStableStiffness({1, 0.2, T, 1.5 * T}, 0.3) == Approx(0.5 / (2 * T)).epsilon(0.01));
 }
 
 TEST_CASE("a SPIDAR alone bears what the notes say") {

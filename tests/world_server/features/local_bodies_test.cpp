@@ -134,10 +134,10 @@ TEST_CASE("reach grows with speed, and a contact that one of two sees is not los
   CHECK(back.Contacts(1, 2) + back.Contacts(2, 1) == 4);
 }
 
-TEST_CASE("a chain of four has copies, and of five none, unless the fifth is heavy") {
-  const auto chain = [](int n, double last_kg) {
+TEST_CASE("a chain of four has copies, and of five that touch none, unless the fifth is heavy") {
+  const auto chain = [](int n, double last_kg, double way = 0.0605) {
     std::vector<SceneBody> bodies;
-    for (int i = 0; i < n; ++i) bodies.push_back(CubeAt(0.065 * i, i == n - 1 ? last_kg : 1));
+    for (int i = 0; i < n; ++i) bodies.push_back(CubeAt(way * i, i == n - 1 ? last_kg : 1));
     return OnFloor(bodies);
   };
   CHECK(Find(chain(4, 1), {1}).count == 4);
@@ -146,12 +146,15 @@ TEST_CASE("a chain of four has copies, and of five none, unless the fifth is hea
   const Found heavy = Find(chain(5, 10), {1});
   CHECK(heavy.Names() == std::set<std::uint32_t>{1, 2, 3, 4});
   CHECK(heavy.Contacts(4, 5) == 4);  // as a plane
+  const Found apart = Find(chain(5, 1, 0.065), {1});
+  CHECK(apart.Names() == std::set<std::uint32_t>{1, 2, 3, 4});
+  CHECK(apart.Contacts(4, 5) == 4);
 }
 
 TEST_CASE("a body that gets none leaves the room to others") {
   // Bodies 1..5 in a chain, and 6 by itself.
   std::vector<SceneBody> bodies;
-  for (int i = 0; i < 5; ++i) bodies.push_back(CubeAt(0.065 * i));
+  for (int i = 0; i < 5; ++i) bodies.push_back(CubeAt(0.0605 * i));
   bodies.push_back(CubeAt(3));
   const Found found = Find(OnFloor(bodies), {1, 6});
   CHECK(found.Names() == std::set<std::uint32_t>{6});
@@ -180,7 +183,7 @@ TEST_CASE("a copy has contacts whatever its shape and its neighbour's") {
   }
 }
 
-TEST_CASE("more contacts than a copy can tell mean no copy") {
+TEST_CASE("of more contacts than a copy can have it has the nearest") {
   // A cube on the floor with cubes close by on all sides and on top: more than 16 points.
   Scene scene = OnFloor({CubeAt(0)});
   for (const Vec3& at :
@@ -189,7 +192,10 @@ TEST_CASE("more contacts than a copy can tell mean no copy") {
     wall.fixed = true;
     scene.bodies.push_back(wall);
   }
-  CHECK(Find(scene, {1}).count == 0);
+  const Found found = Find(scene, {1});
+  REQUIRE(found.count == 1);
+  CHECK(found.bodies[0].contact_count == protocol::kMaxContactPlanes);
+  CHECK(found.Contacts(1, 0) == 4);  // what it stands on
 }
 
 }  // namespace rikiseki::world

@@ -61,6 +61,40 @@ TEST_CASE("what rests falls asleep within two seconds, costs nothing and stays t
   }
 }
 
+TEST_CASE("a scene that begins at rest sleeps before its first world period is over") {
+  Scene scene = CubesApart(100);
+  BulletWorld world(scene, 1e-3);
+  Play(world, 0.05);
+  CHECK(world.awake() == 0);
+  // Each sinks by its resting depth, a ten thousandth of its diagonal: 3.5 um.
+  for (std::size_t i = 1; i <= 100; ++i) {
+    CHECK((world.State(i).pose.position - scene.bodies[i].pose_WB.position).norm() < 4e-6);
+  }
+}
+
+TEST_CASE("what begins at rest and is about to roll, fall or tip does not fall asleep") {
+  // On a slope of 1e-3 a ball rolls at 5/7 g 1e-3 = 7 mm/s^2.
+  Scene slope;
+  slope.gravity = {9.81e-3, 0, -9.81};
+  slope.bodies = {Floor(0.5), Cube(0.02, 0.02, 0.5, {0, 0, 0.01})};
+  slope.bodies[1].colliders[0].shape = Sphere{0.01};
+  slope.bodies[1].inertia = Mat3::Identity() * (0.4 * 0.02 * 1e-4);
+  BulletWorld rolling(slope, 1e-3);
+  Play(rolling, 1);
+  CHECK(rolling.State(1).pose.position.x() == Approx(9.81e-3 * 5 / 14).epsilon(1e-2));
+
+  // Its middle 0.01 mm beyond the edge of what carries it.
+  Scene edge;
+  edge.bodies = {Floor(0.5), Cube(0.02, 0.02, 0.5, {0.01001, 0, 0.03})};
+  edge.bodies.push_back(Cube(0.02, 1, 0.5, {-0.01, 0, 0.01}));
+  edge.bodies.back().name = "table::link";
+  edge.bodies.back().fixed = true;
+  edge.bodies.back().colliders[0].shape = Box{{0.02, 0.02, 0.01}};
+  BulletWorld tipping(edge, 1e-3);
+  Play(tipping, 2);
+  CHECK(tipping.State(1).pose.position.z() < 0.02);
+}
+
 TEST_CASE("a push wakes those that it reaches and no others") {
   Scene scene = CubesApart(3);
   scene.bodies.push_back(Cube(0.02, 0.02, 0.5, {0, 0, 0.03}));  // on the first
