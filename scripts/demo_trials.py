@@ -38,15 +38,15 @@ def parse_arguments():
 class Pair:
     """Both daemons under one instance name, and a stream of status readings from them."""
 
-    def __init__(self, arguments, coupling, logs):
+    def __init__(self, arguments, coupling, logs, haptic_config=None):
         self.instance = INSTANCE
         self.logs = logs
         self.commands = {
             "world_server": [f"{arguments.bin}/world_server", "--config", f"{arguments.config}/world_server.ini",
                              "--instance", self.instance, "--set", f"coupling.coupling={coupling}",
                              "--set", f"loop.rate_hz={arguments.world_rate:g}"],
-            "haptic_server": [f"{arguments.bin}/haptic_server", "--config", f"{arguments.config}/haptic_server.ini",
-                              "--instance", self.instance],
+            "haptic_server": [f"{arguments.bin}/haptic_server", "--config",
+                              haptic_config or f"{arguments.config}/haptic_server.ini", "--instance", self.instance],
             "haptic_status": [f"{arguments.bin}/haptic_status", "--instance", self.instance, "--json",
                               "--interval", "0.05"],
         }
