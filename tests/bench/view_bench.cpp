@@ -88,8 +88,8 @@ TEST_CASE("lateness of the pair with and without four clients, by turns") {
   pair.StartWorld();
   pair.StartHaptic();
   pair.StartViewer();
-  const auto haptic = Observe(pair.instance(), protocol::Role::kHaptic);
-  const auto world = Observe(pair.instance(), protocol::Role::kWorld);
+  const auto haptic = Observe(pair.instance(), protocol::Role::kHaptic, 60);
+  const auto world = Observe(pair.instance(), protocol::Role::kWorld, 60);
   Lateness alone;
   Lateness watched;
   for (int turn = 0; turn < 2 * kTurns; ++turn) {

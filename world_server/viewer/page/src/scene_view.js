@@ -67,7 +67,9 @@ export class SceneView {
     if (generation !== this.#generation) return; // another scene came meanwhile
     const painted = collider.colour.some((value, i) => value !== UNPAINTED[i]);
     const [red, green, blue, alpha] = collider.colour;
-    const material = new THREE.MeshLambertMaterial({
+    // The ground fills the picture and has one normal: light need not be computed for each pixel.
+    const Material = isGround(collider) ? THREE.MeshBasicMaterial : THREE.MeshLambertMaterial;
+    const material = new Material({
       color: painted ? new THREE.Color(red, green, blue) : palette()[fixed ? "fixed" : "moving"],
       transparent: alpha < 1,
       opacity: alpha,
