@@ -2,7 +2,6 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <random>
 
 #include "tests/world_server/meshes.h"
 
@@ -47,30 +46,6 @@ TEST_CASE("what is wrong with a mesh is counted") {
                   std::invalid_argument);
   CHECK_THROWS_AS(TriangleMesh(raw.corners, std::vector<Triangle>{{0, 1, 1}}),
                   std::invalid_argument);
-}
-
-TEST_CASE("a tree of boxes finds what is near, and all of it") {
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  for (const std::size_t count : {1UL, 7UL, 500UL}) {
-    std::vector<Bounds> boxes(count);
-    for (Bounds& box : boxes) {
-      const Vec3 centre(uniform(random), uniform(random), uniform(random));
-      box.Add(centre);
-      box.Add(Vec3(centre + 0.1 * Vec3::Random().cwiseAbs()));
-    }
-    const BoxTree tree(boxes, 4);
-    for (int i = 0; i < 100; ++i) {
-      const Vec3 p(uniform(random), uniform(random), uniform(random));
-      std::vector<int> visits(count, 0);
-      tree.VisitNear(p, 0.3, [&](std::uint32_t item) { ++visits[item]; });
-      for (std::size_t j = 0; j < count; ++j) {
-        REQUIRE(visits[j] <= 1);
-        if (boxes[j].SquaredDistance(p) <= 0.09) REQUIRE(visits[j] == 1);
-      }
-    }
-  }
-  BoxTree().VisitNear(Vec3::Zero(), 1, [](std::uint32_t) { FAIL(); });
 }
 
 }  // namespace rikiseki::world
