@@ -72,7 +72,10 @@ TEST_CASE("a hand stirs in every scene: finite, bounded, below cap and slew limi
 // It had 31 kJ after 6 s while it had no copy: kicks of a world period into 50 g, and then, where it no
 // longer was, at levers of metres.
 TEST_CASE("a light body that is squeezed onto a jointed one gets no energy from nowhere") {
-  const world::Scene scene = world::LoadSdf(RIKISEKI_SCENES_DIR "/turntable.sdf").scene;
+  const world::Scene scene = world::LoadSdf(RIKISEKI_SOURCE_DIR
+                                            "/config/scenes"
+                                            "/turntable.sdf")
+                                 .scene;
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     for (const double rate_hz : {10.0, 20.0}) {
       const StirResult got =
