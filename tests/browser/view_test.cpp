@@ -213,7 +213,7 @@ TEST_CASE("the picture is what stands in shared memory: block, planes, force, im
   CHECK(rows > 500);
 }
 
-TEST_CASE("pause and step back, by key; phone width and dark") {
+TEST_CASE("pause and step back, by key, at phone width and in the dark") {
   WatchedPair pair;
   pair.StartWorld();
   pair.StartHaptic();

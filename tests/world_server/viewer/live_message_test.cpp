@@ -151,7 +151,7 @@ TEST_CASE("an update holds the ticks since the one before, each once, and a fram
   CHECK(Decoded(UpdateMessage(*pair.watch, pair.now_ns, other)).head["ticks"]["count"] == 6);
 }
 
-TEST_CASE("frames come in order, each once; after a pause the last, as many as are kept") {
+TEST_CASE("frames come in order, each once, after a pause the last, as many as are kept") {
   Watched pair;
   pair.StartWorld();
   auto frames = pair.world->Writer<WorldFrame>();
@@ -213,7 +213,7 @@ TEST_CASE("a browser that was away is told the newest ticks, not all of them") {
   CHECK(update.numbers[1] == static_cast<double>(number - kMostTicks + 1));
 }
 
-TEST_CASE("either side may be missing, come and go; the scene is told when it is another") {
+TEST_CASE("either side may be missing, come and go, the scene is told when it is another") {
   Watched pair;
   pair.Poll();
   Told told;
