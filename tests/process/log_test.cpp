@@ -44,6 +44,8 @@ struct Row {
   std::uint64_t world_frame = 0;
   bool frame_known = false;
   double x = 0;
+  double force_x = 0;
+  double impulse_x = 0;
 };
 
 std::vector<Row> Export(const std::string& recording, const std::string& csv) {
@@ -63,7 +65,9 @@ std::vector<Row> Export(const std::string& recording, const std::string& csv) {
                     .tick = std::stoull(cells[2]),
                     .world_frame = std::stoull(cells[16]),
                     .frame_known = !cells[18].empty(),
-                    .x = std::stod(cells[6])});
+                    .x = std::stod(cells[6]),
+                    .force_x = std::stod(cells[12]),
+                    .impulse_x = std::stod(cells[19])});
   }
   return rows;
 }
@@ -89,7 +93,8 @@ TEST_CASE("every tick is in the recording, over a restart, with the frame that i
   const auto first = Observe(instance, Role::kHaptic);
   Child log({Program("haptic_log"), "record", recording, "--instance", instance});
   REQUIRE(Eventually([&] { return log.Stderr().find("haptic epoch") != std::string::npos; }));
-  REQUIRE(Eventually([&] { return first->Tick() > 1000; }, 20));
+  TickWatch watch(instance, 5000);
+  REQUIRE(Eventually([&] { return watch.Latest().force > 1; }, 20));
   haptic->Signal(SIGTERM);
   REQUIRE(haptic->Wait() == 0);
   const std::uint64_t last_tick = first->Tick();
@@ -103,12 +108,18 @@ TEST_CASE("every tick is in the recording, over a restart, with the frame that i
   CheckComplete(rows);
   CHECK(rows.back().epoch == second->epoch());
   bool ended = false;
+  double impulse = 0;
+  double force = 0;
   for (const Row& row : rows) {
     ended = ended || (row.epoch == first->epoch() && row.tick == last_tick);
+    impulse = std::max(impulse, row.impulse_x);
+    force = std::max(force, -row.force_x);  // on the user; the impulse is on the body
     // Of those before the recorder came, the frames may be overwritten.
     if (row.epoch == second->epoch() && row.world_frame > 0) CHECK(row.frame_known);
   }
   CHECK(ended);
+  CHECK(force > 1);
+  CHECK(impulse > 0);
   const std::string info = OutputOf(Program("haptic_log") + " info " + recording);
   CHECK_THAT(info, Contains("haptic.tick    epoch " + std::to_string(first->epoch())));
   CHECK_THAT(info, Contains("world.frame") && Contains("contact"));
