@@ -9,7 +9,7 @@ export CMAKE_CXX_COMPILER_LAUNCHER=ccache CMAKE_C_COMPILER_LAUNCHER=ccache
 packages_build=(build-essential cmake ninja-build ccache pkg-config git
   libboost-dev libboost-program-options-dev libeigen3-dev libspdlog-dev nlohmann-json3-dev
   libbullet-dev libsdformat-dev libassimp-dev libusb-1.0-0-dev libsystemd-dev python3)
-packages_test=(catch2 umockdev libumockdev-dev systemd-container)
+packages_test=(catch2 file umockdev libumockdev-dev systemd-container)
 packages_full=(clang libclang-rt-14-dev clang-format clang-tidy lintian)
 
 say() { printf '%s\n' "$*" >&2; }
