@@ -1,4 +1,4 @@
-// The one thing that all readers of text files do.
+// What is done to text in more than one room.
 #pragma once
 
 #include <string>
@@ -11,5 +11,8 @@ inline std::string Trim(const std::string& text) {
   if (first == std::string::npos) return "";
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
+
+/// For HTML, SVG and XML: &, <, >, " escaped.
+std::string Escaped(const std::string& text);
 
 }  // namespace rikiseki

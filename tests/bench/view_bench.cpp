@@ -62,9 +62,7 @@ void Print(const char* what, const protocol::Histogram& lateness) {
 
 TEST_CASE("pictures per second of a thousand cubes at 640x360") {
   WatchedPair pair({}, "config/scenes/thousand.sdf");
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   Chromium page(pair.url(), 640 + 320, 360 + 120);  // with charts and buttons
   const auto picture = AwaitPicture(page, [](const nlohmann::json& shown) {
     return shown["bodies"].size() > 900 && shown["frames"] > 20 && shown["fps"] > 0;
@@ -85,9 +83,7 @@ TEST_CASE("pictures per second of a thousand cubes at 640x360") {
 
 TEST_CASE("lateness of the pair with and without four clients, by turns") {
   WatchedPair pair({}, "config/scenes/thousand.sdf");
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   const auto haptic = Observe(pair.instance(), protocol::Role::kHaptic, 60);
   const auto world = Observe(pair.instance(), protocol::Role::kWorld, 60);
   Lateness alone;

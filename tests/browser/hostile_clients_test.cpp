@@ -71,9 +71,7 @@ std::size_t ResidentKb(pid_t pid) {
 
 TEST_CASE("a browser that says nothing gets as many updates as are sent ahead, and no more") {
   WatchedPair pair;
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   Observe(pair.instance(), protocol::Role::kHaptic);
   const RawClient silent(pair.port());
   silent.Send(LiveRequest(pair.port()));
@@ -111,9 +109,7 @@ TEST_CASE(
   const std::size_t most = std::min<std::size_t>(1000, files.rlim_cur - 100);
 
   WatchedPair pair;
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   const int port = pair.port();
   const TickWatch watch(pair.instance(), kSlewLimit);
   const auto haptic = Observe(pair.instance(), protocol::Role::kHaptic);

@@ -111,9 +111,7 @@ json PictureAndFrames(Chromium& page) {
 
 TEST_CASE("the picture is what stands in shared memory: block, planes, force, impulses, copies") {
   WatchedPair pair;
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   const BodyWatch bodies(pair.instance());
   const TickWatch ticks(pair.instance(), kSlewLimit);
   Chromium page(pair.url(), kWidth, kHeight);
@@ -215,9 +213,7 @@ TEST_CASE("the picture is what stands in shared memory: block, planes, force, im
 
 TEST_CASE("pause and step back, by key, at phone width and in the dark") {
   WatchedPair pair;
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   Chromium page(pair.url(), kWidth, kHeight);
   REQUIRE(ShowsScene(AwaitPicture(page, ShowsScene)));
   REQUIRE(InContact(AwaitPush(page, pair, InContact)));
@@ -325,9 +321,7 @@ TEST_CASE("interpolation moves monotonically at 5 Hz where the raw view steps") 
 
 TEST_CASE("the banner says when and why there is no force, and the page recovers by itself") {
   WatchedPair pair;
-  pair.StartWorld();
-  pair.StartHaptic();
-  pair.StartViewer();
+  pair.StartAll();
   Chromium page(pair.url(), kWidth, kHeight);
   REQUIRE(ShowsScene(AwaitPicture(page, ShowsScene)));
   const auto says = [](const std::string& words) {

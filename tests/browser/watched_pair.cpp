@@ -16,6 +16,12 @@ using Clock = std::chrono::steady_clock;
 WatchedPair::WatchedPair(std::vector<std::string> world_set, const std::string& scene)
     : world_set_(std::move(world_set)), scene_(scene), port_(FreePort()) {}
 
+void WatchedPair::StartAll() {
+  StartWorld();
+  StartHaptic();
+  StartViewer();
+}
+
 void WatchedPair::StartHaptic() {
   haptic.emplace(std::vector<std::string>{Program("haptic_server"), "--config",
                                           SourceFile("config/haptic_server.ini"), "--instance",

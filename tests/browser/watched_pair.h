@@ -22,6 +22,8 @@ class WatchedPair {
   int port() const { return port_; }
   std::string url() const { return "http://127.0.0.1:" + std::to_string(port_) + "/"; }
 
+  /// World, haptic side and viewer.
+  void StartAll();
   void StartHaptic();
   void StartWorld();
   /// Returns when it listens.

@@ -16,12 +16,7 @@ TEST_CASE("a finger in a wall feels k times the depth of its sphere, and the mes
   bench.Run(400);
   REQUIRE(bench.message.pointers[0].reason == ForceReason::kNoContact);
   REQUIRE(bench.step.health().peer_state == PeerState::kLive);
-  for (int i = 0; i < 60; ++i) {  // in slowly: an approach, no surprise
-    bench.device.next.position.x() += 0.0007;
-    bench.device.next.velocity.x() = 0.7;
-    bench.Run(1);
-  }
-  bench.device.next.velocity.setZero();
+  PushIn(bench);
   const Vec3 force = bench.Run(20);
   const double depth = bench.device.next.position.x() + 0.01;
   REQUIRE(depth == Approx(0.002));
@@ -54,12 +49,7 @@ TEST_CASE("whatever ends a world, the force fades to zero within the stated boun
   settings.safety.soft_start_ms = 0;
   Bench bench(settings);
   bench.Run(200);
-  for (int i = 0; i < 60; ++i) {
-    bench.device.next.position.x() += 0.0007;
-    bench.device.next.velocity.x() = 0.7;
-    bench.Run(1);
-  }
-  bench.device.next.velocity.setZero();
+  PushIn(bench);
   const double before = bench.Run(90).norm();
   REQUIRE(before == Approx(4).epsilon(1e-6));
   bench.Tick(&bench.NextFrame());
@@ -107,12 +97,7 @@ TEST_CASE(
     "again") {
   Bench bench;
   bench.Run(300);
-  for (int i = 0; i < 60; ++i) {
-    bench.device.next.position.x() += 0.0007;
-    bench.device.next.velocity.x() = 0.7;
-    bench.Run(1);
-  }
-  bench.device.next.velocity.setZero();
+  PushIn(bench);
   bench.Run(20);
   REQUIRE(bench.device.force.norm() == Approx(4).epsilon(1e-6));
   ForceReason reason = ForceReason::kContact;

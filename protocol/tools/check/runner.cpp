@@ -6,36 +6,11 @@
 
 #include "common/clock.h"
 #include "common/exit_code.h"
+#include "common/text.h"
 #include "protocol/tools/check/haptic_player.h"
 #include "protocol/tools/check/world_player.h"
 
 namespace rikiseki::protocol::check {
-namespace {
-
-std::string Escaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
-}  // namespace
 
 void Reporter::Add(const Result& result) {
   results_.push_back(result);

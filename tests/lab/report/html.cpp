@@ -1,5 +1,7 @@
 #include "tests/lab/report/html.h"
 
+#include "common/text.h"
+
 namespace rikiseki::lab {
 namespace {
 

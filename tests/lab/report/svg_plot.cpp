@@ -8,6 +8,8 @@
 #include <limits>
 #include <sstream>
 
+#include "common/text.h"
+
 namespace rikiseki::lab {
 namespace {
 
@@ -223,29 +225,6 @@ class Canvas {
 
 std::string Svg(const Plot& plot) {
   return Canvas(plot).Draw();
-}
-
-std::string Escaped(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
 }
 
 std::string Short(double value) {

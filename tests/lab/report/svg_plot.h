@@ -44,9 +44,6 @@ struct Plot {
 
 std::string Svg(const Plot& plot);
 
-/// Text for HTML and SVG: &, <, >, " escaped.
-std::string Escaped(const std::string& text);
-
 /// Three significant digits: 0.00123, 12.3, 12300, 1.23e-05.
 std::string Short(double value);
 

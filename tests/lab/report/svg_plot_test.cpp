@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/text.h"
+
 namespace rikiseki::lab {
 namespace {
 
