@@ -302,12 +302,14 @@ void HapticStep::Tick(const TickTime& time, const WorldInput& world, protocol::H
   state.energy.Displayed(on_device, state.safety.ground(), input.wanted);
   const Vec3 displayed = state.mapping.ForceInWorld(on_device);
 
-  state.ledger.Book({.previous_duration_ns = time.previous_duration_ns,
-                     .pointer = kPointer,
-                     .displayed = displayed,
-                     .for_ground = state.mapping.ForceInWorld(state.safety.ground()),
-                     .wanted = shares,
-                     .finger = state.sample.position});
+  state.ledger.Book(
+      {.previous_duration_ns = time.previous_duration_ns,
+       .pointer = kPointer,
+       .displayed = displayed,
+       .for_ground = state.mapping.ForceInWorld(state.safety.ground()),
+       .wanted = shares,
+       .finger = state.sample.position,
+       .largest_share = state.settings.safety.force_cap_n * state.mapping.force_in_world()});
   state.split.Book(state.tick, state.sample.position, state.ledger.Booked());
   state.intake.copies().Step(state.tick, state.ledger.Booked(),
                              state.tick == 0

@@ -30,9 +30,11 @@ struct WorldStep::State {
   std::vector<BodyState> states;
   BodyNumbers numbers;
   LedgerReader ledger;
-  std::vector<Finger> fingers;   // of the newest message
-  double stiffness_n_per_m = 0;  // that it renders with
-  std::int64_t silence_ns = 0;   // world time since it came
+  PushBudgets budgets;              // of bodies that are pushed and have no local copy
+  std::vector<std::size_t> copied;  // places of the newest frame's local bodies
+  std::vector<Finger> fingers;      // of the newest message
+  double stiffness_n_per_m = 0;     // that it renders with
+  std::int64_t silence_ns = 0;      // world time since it came
   std::uint64_t frame = 0;
   std::int64_t world_time_ns = 0;
   std::vector<protocol::Body> bodies;
@@ -50,6 +52,7 @@ struct WorldStep::State {
   void NameOnWire(protocol::WorldFrame& told) const;
   void ReadStates();
   void Advance(double period_s);
+  void GrantBudgets(std::span<const OwedPush> owed);
   void Penalise(double period_s);
   void Push(std::span<const Kick> kicks, double period_s);
 };
@@ -77,6 +80,8 @@ void WorldStep::State::Adopt(Scene new_scene, std::unique_ptr<DynamicsWorld> new
     if (!body.fixed) ++health.moving_bodies;
   }
   ledger.SetBodies(std::move(tags));
+  budgets.clear();
+  copied.clear();
   health.scene = {};
   const std::size_t length = std::min(scene.name.size(), health.scene.size() - 1);
   std::copy_n(scene.name.begin(), length, health.scene.begin());
@@ -92,6 +97,22 @@ void WorldStep::State::ReadStates() {
     bodies[i].velocity = ToArray(states[i].velocity);
     bodies[i].angular_velocity = ToArray(states[i].angular_velocity);
   }
+}
+
+// The couplings of the experiments give the bodies everything; under `local` a rigid body that the haptic side
+// could not move by itself takes what the finger's work allows.
+void WorldStep::State::GrantBudgets(std::span<const OwedPush> owed) {
+  PushBudgets granted;
+  for (const OwedPush& owes : owed) {
+    const std::size_t body = owes.push.body;
+    const bool has_copy = std::find(copied.begin(), copied.end(), body) != copied.end();
+    if (has_copy || scene.bodies[body].softness) continue;
+    const auto known = budgets.find(body);
+    PushBudget budget = known != budgets.end() ? known->second : PushBudget();
+    budget.Grant(owes.work_j, owes.spring_j, states[body]);
+    granted.emplace(body, budget);
+  }
+  budgets = std::move(granted);
 }
 
 // `position`: a finger that has not been heard of for a gap pushes no longer.
@@ -120,13 +141,15 @@ void WorldStep::State::Push(std::span<const Kick> kicks, double period_s) {
 
 // Coupling and physics.
 void WorldStep::State::Advance(double period_s) {
-  const std::span<const PlacedImpulse> owed = ledger.Take();
+  const std::span<const OwedPush> owed = ledger.Take();
   if (settings.coupling.coupling == protocol::Coupling::kPosition) {
     Penalise(period_s);
   } else if (settings.coupling.coupling == protocol::Coupling::kLocal &&
              settings.coupling.replay == ReplayRule::kTicks) {
+    GrantBudgets(owed);
     ReplayPush(ledger.replay(), period_s, settings.coupling.force_cap_n * settings.gap_s(),
-               *dynamics);
+               *dynamics, &budgets);
+    for (const auto& [body, budget] : budgets) ledger.GiveBack(budget.refused());
   } else {
     Push(ImpulseKicks(owed, states), period_s);
   }
@@ -194,6 +217,11 @@ void WorldStep::Tick(double period_s, protocol::WorldFrame& frame) {
     frame.local_body_count = FindLocalBodies(s.scene, *s.dynamics, s.states, generations,
                                              std::span(frame.planes).first(frame.plane_count),
                                              reach, frame.local_bodies);
+    s.copied.clear();
+    for (const protocol::LocalBody& local :
+         std::span(frame.local_bodies).first(frame.local_body_count)) {
+      s.copied.push_back(local.body);
+    }
     frame.local_substep_ns =
         static_cast<std::uint64_t>(std::llround(s.settings.physics.substep_ms * 1e6));
   }

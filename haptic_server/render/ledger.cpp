@@ -167,6 +167,8 @@ void Ledger::Book(const Entry& entry) noexcept {
           share.generation == account.channel.generation &&
           entry.pointer == account.channel.pointer) {
         force = -fraction * share.force;
+        const double size = force.stableNorm();
+        if (size > entry.largest_share) force *= entry.largest_share / size;
         point = share.point;
         account.channel.contact_point = ToArray(point);
       }

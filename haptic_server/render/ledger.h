@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -58,11 +59,13 @@ class Ledger {
     Vec3 for_ground = Vec3::Zero();     // N, of it: what no body asked for
     std::span<const BodyShare> wanted;  // each with an open channel, unless its body is fixed
     Vec3 finger = Vec3::Zero();         // m, centre: where what belongs to nobody acts
+    double largest_share = std::numeric_limits<double>::infinity();  // N, of one body
   };
 
   /// Books the next tick, from 0: body shares scaled by clip((displayed - for_ground) . wanted /
   /// |wanted|^2, 0, 1), those of fixed bodies and the rest to the ground. Every unit of the
-  /// displayed force goes somewhere. // RT:
+  /// displayed force goes somewhere. Between two surfaces that meet at a sharp angle each share is larger
+  /// than their sum by any factor: no body gets more than `largest_share`. // RT:
   void Book(const Entry& entry) noexcept;
 
   /// What that added to each open channel, as it is published; at most kMaxTickImpulses. // RT:

@@ -50,6 +50,7 @@ Outcome RunRow(const Row& row, std::uint64_t seed) {
       {.scene = world::LoadSdf(has_folder ? name : RIKISEKI_SCENES_DIR "/" + name).scene,
        .duration_s = row.Number("seconds", 0.1, 1e4),
        .world_rate_hz = row.NumberOr("rate_hz", 1, 1000, 20),
+       .passivity_controller = row.NumberOr("controller", 0, 1, 1) != 0,
        .low_m = row.NumberOr("low_m", -1, 0.04, -0.03),
        .seed = seed});
   char hash[17];

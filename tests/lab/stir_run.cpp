@@ -175,7 +175,8 @@ std::string Broken(const StirResult& got) {
 }
 
 StirResult SimulateStir(const Stir& stir) {
-  const haptic::Settings haptic_settings;
+  haptic::Settings haptic_settings;
+  haptic_settings.safety.passivity_controller = stir.passivity_controller;
   world::Settings world_settings;
   world_settings.loop.rate_hz = stir.world_rate_hz;
   world_settings.coupling.coupling = stir.coupling;

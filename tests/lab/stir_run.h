@@ -19,6 +19,9 @@ struct Stir {
   double duration_s = 60;
   double world_rate_hz = 20;
   protocol::Coupling coupling = protocol::Coupling::kLocal;
+  // As for people. Without it a press near the edge of a soft block gives the hand up to 0.1 J: the plane
+  // turns over the edge while the finger is 20 mm deep.
+  bool passivity_controller = true;
   double low_m = -0.03;  // the lower end of its box: where most scenes have their floor
   std::uint64_t seed = 1;
 };

@@ -80,6 +80,8 @@ void TickWatch::Run() {
   protocol::HapticTick tick;
   protocol::HapticTick tick_before;
   protocol::Vector before{};
+  protocol::Vector place_before{};
+  double work_j = 0;
   protocol::ImpulseUnits displayed{};
   std::uint64_t number_before = 0;
   while (!stop_) {
@@ -98,8 +100,12 @@ void TickWatch::Run() {
           std::hypot(force[0] - before[0], force[1] - before[1], force[2] - before[2]);
       const double allowed = slew_limit_ * static_cast<double>(tick.period_ns) * 1e-9;
       const bool stopped = tick.pointers[0].reason == protocol::ForceReason::kEmergencyStop;
+      const protocol::Vector& place = tick.pointers[0].position;
+      for (std::size_t i = 0; i < 3; ++i) work_j -= before[i] * (place[i] - place_before[i]);
+      largest_work_ = std::max(largest_work_.load(), work_j);
       if (!stopped) worst_over_slew_ = std::max(worst_over_slew_.load(), step - allowed);
     }
+    place_before = tick.pointers[0].position;
     number_before = reader.received().number;
     before = force;
     const protocol::ImpulseUnits growth = Growth(tick, tick_before);

@@ -49,6 +49,9 @@ class TickWatch {
   bool finite() const { return finite_; }
   double worst_over_cap() const { return worst_over_cap_; }    // N above the cap, <= 0 is good
   double worst_over_slew() const { return worst_over_slew_; }  // N above the step allowed per tick
+  double largest_work() const {
+    return largest_work_;
+  }  // J, the most that the hand ever had done; no tick lost
 
  private:
   void Run();
@@ -61,6 +64,7 @@ class TickWatch {
   std::atomic<bool> finite_{true};
   std::atomic<double> worst_over_cap_{-1e9};
   std::atomic<double> worst_over_slew_{-1e9};
+  std::atomic<double> largest_work_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

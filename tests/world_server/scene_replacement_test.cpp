@@ -22,29 +22,38 @@ class Running {
   explicit Running(const Scene& scene, protocol::Coupling coupling = protocol::Coupling::kLocal)
       : step_(SettingsFor(coupling), scene, std::make_unique<BulletWorld>(scene, 1e-3), 0) {
     step_.BeginHapticEpoch(1);
+    tick_.pointer_count = 2;
+    tick_.pointers[0].position = {0, 0, 10};
+    tick_.pointers[1].pointer = kPusher;
+    tick_.pointers[1].position = {0, 0, 1000};
   }
 
   void Finger(const Vec3& position) {
-    tick_.pointer_count = 1;
     tick_.pointers[0].radius = 0.01;
     tick_.pointers[0].position = ToArray(position);
   }
 
-  /// The finger gives this impulse [1e-12 N s] in x to a body until the next tick.
+  /// Another finger, far away, gives this impulse [1e-12 N s] in x to a body until the next tick.
   void Push(const protocol::Body& body, std::int64_t units) {
     tick_.channel_count = 1;
     protocol::Channel& channel = tick_.channels[0];
     if (channel.body != body.body || channel.generation != body.generation) {
-      channel = {.body = body.body, .generation = body.generation, .opened_tick = tick_.tick + 1};
+      channel = {.body = body.body,
+                 .generation = body.generation,
+                 .pointer = kPusher,
+                 .opened_tick = tick_.tick + 1};
     }
     channel.impulse[0] += units;
+    way_ = units < 0 ? -1 : 1;
     Send();
   }
 
   void Send() {
     ++tick_.tick;
     tick_.start_ns += 1'000'000;
-    tick_.previous_duration_ns = 1'000'000;
+    tick_.period_ns = tick_.previous_duration_ns = 1'000'000;
+    // It goes along, and has worked enough for whatever it gives.
+    tick_.pointers[1].position[0] += way_;
     step_.Consume(tick_);
   }
 
@@ -72,6 +81,9 @@ class Running {
     return settings;
   }
 
+  static constexpr std::uint32_t kPusher = 1;
+
+  double way_ = 0;  // m, of the other finger from message to message
   WorldStep step_;
   HapticTick tick_;
   WorldFrame frame_;

@@ -51,11 +51,10 @@ Overlap SoftOverlap(const SoftSurface& soft, const Collider& collider, const Pos
 
 }  // namespace
 
-std::vector<Kick> ImpulseKicks(std::span<const PlacedImpulse> owed,
-                               std::span<const BodyState> states) {
+std::vector<Kick> ImpulseKicks(std::span<const OwedPush> owed, std::span<const BodyState> states) {
   std::vector<Kick> kicks;
-  for (const PlacedImpulse& push : owed) {
-    kicks.push_back(KickOf(push, states[push.body].pose.position));
+  for (const OwedPush& owes : owed) {
+    kicks.push_back(KickOf(owes.push, states[owes.push.body].pose.position));
   }
   return kicks;
 }

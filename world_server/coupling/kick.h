@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "world_server/coupling/ledger_reader.h"
 #include "world_server/features/planes.h"
 #include "world_server/physics/dynamics_world.h"
 #include "world_server/scene/scene.h"
@@ -13,8 +14,7 @@
 namespace rikiseki::world {
 
 /// `impulse`: one kick per body, at its present centre.
-std::vector<Kick> ImpulseKicks(std::span<const PlacedImpulse> owed,
-                               std::span<const BodyState> states);
+std::vector<Kick> ImpulseKicks(std::span<const OwedPush> owed, std::span<const BodyState> states);
 
 /// What `position` renders with.
 struct PenaltyLaw {

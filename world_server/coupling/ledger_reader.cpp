@@ -75,6 +75,7 @@ void LedgerReader::BeginEpoch(std::uint64_t epoch) {
   epoch_ = epoch;
   has_baseline_ = false;
   known_.clear();
+  fingers_.fill(std::nullopt);
   epoch_books_ = {};
   for (OwedUnits& body : owed_) body.impulse_before = body.impulse;
 }
@@ -91,18 +92,24 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
   const std::size_t count = std::min(tick.channel_count, protocol::kMaxChannels);
   std::vector<KnownChannel> present;
   std::vector<Increment> increments;
+  const std::uint64_t ticks = has_baseline_ ? tick.tick - last_tick_ : 1;
+  const double held_s = static_cast<double>(ticks) * static_cast<double>(tick.period_ns) * 1e-9;
+  Fingers fingers;
+  for (const protocol::Pointer& pointer :
+       std::span(tick.pointers).first(std::min(tick.pointer_count, protocol::kMaxPointers))) {
+    if (pointer.pointer < fingers.size()) fingers[pointer.pointer] = ToVec3(pointer.position);
+  }
   for (const protocol::Channel& channel : std::span(tick.channels).first(count)) {
     const auto is_same = [&](const KnownChannel& known) { return known.Is(channel); };
     if (std::any_of(present.begin(), present.end(), is_same)) continue;  // said twice: once counts
-    const KnownChannel now{.body = channel.body,
-                           .generation = channel.generation,
-                           .pointer = channel.pointer,
-                           .opened_tick = channel.opened_tick,
-                           .impulse = channel.impulse,
-                           .angular_impulse = channel.angular_impulse,
-                           .first_moment = ToVec3(channel.first_moment),
-                           .angular_first_moment = ToVec3(channel.angular_first_moment)};
-    present.push_back(now);
+    KnownChannel now{.body = channel.body,
+                     .generation = channel.generation,
+                     .pointer = channel.pointer,
+                     .opened_tick = channel.opened_tick,
+                     .impulse = channel.impulse,
+                     .angular_impulse = channel.angular_impulse,
+                     .first_moment = ToVec3(channel.first_moment),
+                     .angular_first_moment = ToVec3(channel.angular_first_moment)};
 
     KnownChannel before = now;
     const auto known = std::find_if(known_.begin(), known_.end(), is_same);
@@ -112,17 +119,29 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
       before.impulse = before.angular_impulse = {};
       before.first_moment = before.angular_first_moment = Vec3::Zero();
     }  // else it is part of the baseline, or its history is unknown: it counts from here
+    const ImpulseUnits impulse = Minus(now.impulse, before.impulse);
+    if (held_s > 0) now.force = InSi(impulse) / held_s;
+    double work_j = 0;
+    if (now.pointer < fingers.size() && fingers[now.pointer] && fingers_[now.pointer]) {
+      // What was lost between the two is in the sum of this one.
+      const Vec3& force = ticks > 1 ? now.force : before.force;
+      work_j = force.dot(*fingers[now.pointer] - *fingers_[now.pointer]);
+    }
+    present.push_back(now);
     increments.push_back(
         {.body = channel.body,
          .generation = channel.generation,
-         .impulse = Minus(now.impulse, before.impulse),
+         .impulse = impulse,
          .angular_impulse = Minus(now.angular_impulse, before.angular_impulse),
          .first_moment = now.first_moment - before.first_moment - length_s * InSi(before.impulse),
          .angular_first_moment = now.angular_first_moment - before.angular_first_moment -
                                  length_s * InSi(before.angular_impulse),
-         .point = ToVec3(channel.contact_point)});
+         .point = ToVec3(channel.contact_point),
+         .work_j = work_j,
+         .spring_j = tick.stiffness > 0 ? 0.5 * now.force.squaredNorm() / tick.stiffness : 0});
   }
   known_ = std::move(present);
+  fingers_ = fingers;
   return increments;
 }
 
@@ -175,6 +194,8 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
       OwedUnits& owed = owed_[increment.body];
       owed.impulse = Plus(owed.impulse, increment.impulse);
       owed.angular_impulse = Plus(owed.angular_impulse, increment.angular_impulse);
+      owed.work_j += increment.work_j;
+      owed.spring_j += increment.spring_j;
       const bool nothing =
           increment.impulse == ImpulseUnits{} && increment.angular_impulse == ImpulseUnits{};
       if (!replays || nothing) continue;
@@ -190,7 +211,7 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
   return true;
 }
 
-std::span<const PlacedImpulse> LedgerReader::Take() {
+std::span<const OwedPush> LedgerReader::Take() {
   taken_.clear();
   ImpulseUnits sum{}, sum_before{};
   for (std::size_t body = 0; body < owed_.size(); ++body) {
@@ -198,9 +219,11 @@ std::span<const PlacedImpulse> LedgerReader::Take() {
     sum = Plus(sum, owed.impulse);
     sum_before = Plus(sum_before, owed.impulse_before);
     if (owed.impulse == ImpulseUnits{} && owed.angular_impulse == ImpulseUnits{}) continue;
-    taken_.push_back({.body = bodies_[body].place,
-                      .impulse = InSi(owed.impulse),
-                      .angular_impulse = InSi(owed.angular_impulse)});
+    taken_.push_back({.push = {.body = bodies_[body].place,
+                               .impulse = InSi(owed.impulse),
+                               .angular_impulse = InSi(owed.angular_impulse)},
+                      .work_j = owed.work_j,
+                      .spring_j = owed.spring_j});
   }
   life_books_.applied = Plus(life_books_.applied, sum);
   epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, sum_before));
@@ -210,6 +233,19 @@ std::span<const PlacedImpulse> LedgerReader::Take() {
   replay_.ticks.clear();
   replay_.impulses.clear();
   return taken_;
+}
+
+void LedgerReader::GiveBack(const Vec3& impulse) {
+  ImpulseUnits units{};
+  for (std::size_t i = 0; i < units.size(); ++i) {
+    const double exact = impulse[static_cast<Eigen::Index>(i)] / protocol::kImpulseUnit;
+    if (std::abs(exact) <= kLargestCountable / protocol::kImpulseUnit)
+      units[i] = std::llround(exact);
+  }
+  for (LedgerBooks* books : {&epoch_books_, &life_books_}) {
+    books->applied = Minus(books->applied, units);
+  }
+  Discard(units, DiscardReason::kGap);
 }
 
 }  // namespace rikiseki::world

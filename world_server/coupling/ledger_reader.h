@@ -52,6 +52,13 @@ struct Replay {
   std::vector<ReplayImpulse> impulses;
 };
 
+/// What a body is owed in a world tick, and what it cost the fingers.
+struct OwedPush {
+  PlacedImpulse push;
+  double work_j = 0;    // J, that the fingers did against it, up to the newest message
+  double spring_j = 0;  // J, that is in their springs then
+};
+
 /// Linear impulse since a baseline.
 struct LedgerBooks {
   protocol::ImpulseUnits applied{};
@@ -81,7 +88,11 @@ class LedgerReader {
   bool Consume(const protocol::HapticTick& tick);
 
   /// Hands out what every body is owed, which counts as applied, and closes the world tick.
-  std::span<const PlacedImpulse> Take();
+  std::span<const OwedPush> Take();
+
+  /// Of what Take() handed out, this [N s] was not applied after all: it counts as discarded, as beyond
+  /// what a world takes in a tick.
+  void GiveBack(const Vec3& impulse);
 
   /// The same, message by message, of the last Take(); empty unless the coupling is `local`.
   const Replay& replay() const { return taken_replay_; }
@@ -96,6 +107,7 @@ class LedgerReader {
   const LedgerBooks& life_books() const { return life_books_; }
 
  private:
+  using Fingers = std::array<std::optional<Vec3>, protocol::kMaxPointers>;  // m, by pointer
   struct KnownChannel {
     std::uint32_t body = 0, generation = 0, pointer = 0;
     std::uint64_t opened_tick = 0;
@@ -103,6 +115,7 @@ class LedgerReader {
     protocol::ImpulseUnits angular_impulse{};
     Vec3 first_moment = Vec3::Zero();
     Vec3 angular_first_moment = Vec3::Zero();
+    Vec3 force = Vec3::Zero();  // N, on the body, held since
 
     bool Is(const protocol::Channel& channel) const;
   };
@@ -113,11 +126,15 @@ class LedgerReader {
     Vec3 first_moment = Vec3::Zero();  // of what came since the message before
     Vec3 angular_first_moment = Vec3::Zero();
     Vec3 point = Vec3::Zero();  // m, of the latest contact
+    double work_j = 0;          // that the finger did since the message before
+    double spring_j = 0;        // in its spring now
   };
   struct OwedUnits {
     protocol::ImpulseUnits impulse{};
     protocol::ImpulseUnits angular_impulse{};
     protocol::ImpulseUnits impulse_before{};  // of it, from epochs before this one
+    double work_j = 0;
+    double spring_j = 0;  // as of the newest message
   };
 
   /// Growth of every channel since the message before, which this one replaces.
@@ -133,13 +150,14 @@ class LedgerReader {
   std::uint64_t baseline_tick_ = 0;
   std::uint64_t last_tick_ = 0;
   std::uint64_t last_start_ns_ = 0;
-  std::vector<KnownChannel> known_;  // of the last message
+  std::vector<KnownChannel> known_;  // of the last message, as are the fingers
+  Fingers fingers_;
 
   std::vector<BodyTag> bodies_;  // by number, as are all below
   std::vector<OwedUnits> owed_;
   double consumed_ns_ = 0;   // sum of |q| over this world tick
   double consumed_nms_ = 0;  // of the angular ones
-  std::vector<PlacedImpulse> taken_;
+  std::vector<OwedPush> taken_;
   Replay replay_;        // by number
   Replay taken_replay_;  // by place
 

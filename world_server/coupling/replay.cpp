@@ -31,7 +31,8 @@ Vec3 ProfileShare(const Vec3& total, const Vec3& moment, double block_s, int i, 
 // The stretches of a period, put together tick by tick.
 class Schedule {
  public:
-  explicit Schedule(double largest_impulse_ns) : largest_impulse_ns_(largest_impulse_ns) {}
+  Schedule(double largest_impulse_ns, PushBudgets* budgets)
+      : largest_impulse_ns_(largest_impulse_ns), budgets_(budgets) {}
 
   void Wait(double time_s) { waiting_s_ += time_s; }
 
@@ -53,7 +54,8 @@ class Schedule {
         pushes_.push_back({.body = push.body,
                            .impulse = impulse,
                            .angular_impulse = angular_impulse,
-                           .point = push.point});
+                           .point = push.point,
+                           .budget = BudgetOf(push.body)});
       }
       Close(length_s / blocks, impulses.size());
     }
@@ -71,6 +73,12 @@ class Schedule {
   }
 
  private:
+  PushBudget* BudgetOf(std::size_t body) {
+    if (budgets_ == nullptr) return nullptr;
+    const auto budget = budgets_->find(body);
+    return budget != budgets_->end() ? &budget->second : nullptr;
+  }
+
   void Close(double length_s, std::size_t pushes) {
     LetPass();
     stretches_.push_back({.length_s = length_s});
@@ -86,6 +94,7 @@ class Schedule {
   }
 
   double largest_impulse_ns_;
+  PushBudgets* budgets_;
   double waiting_s_ = 0;
   std::vector<PlacedImpulse> pushes_;
   std::vector<std::size_t> counts_;  // of pushes, by stretch
@@ -95,11 +104,11 @@ class Schedule {
 }  // namespace
 
 void ReplayPush(const Replay& replay, double period_s, double largest_impulse_ns,
-                DynamicsWorld& world) {
+                DynamicsWorld& world, PushBudgets* budgets) {
   double covered_s = 0;
   for (const ReplayTick& tick : replay.ticks) covered_s += tick.length_s;
   double scale = 1;
-  Schedule schedule(largest_impulse_ns);
+  Schedule schedule(largest_impulse_ns, budgets);
   const double missing_s = period_s - covered_s;
   if (missing_s > kSameTime * period_s) {
     schedule.Wait(missing_s);

@@ -12,6 +12,7 @@
 #include "world_server/physics/contact_pairs.h"
 #include "world_server/physics/group_substep.h"
 #include "world_server/physics/islands.h"
+#include "world_server/physics/push_budget.h"
 #include "world_server/physics/sleep.h"
 #include "world_server/physics/substep_choice.h"
 
@@ -140,7 +141,10 @@ void BulletWorld::Engine::Apply(const Kick& kick) {
 
 void BulletWorld::Engine::Apply(const PlacedImpulse& push) {
   const std::size_t place = bodies.moving_of[push.body];
-  const Kick kick = KickOn(push);
+  Kick kick = KickOn(push);
+  if (push.budget != nullptr) {
+    push.budget->Limit(bodies.moving[place].inertia, bodies.moving[place].State(), kick);
+  }
   ApplyKick(bodies.moving[place], kick.impulse, kick.angular_impulse);
   world.joints().Settle(place);
 }

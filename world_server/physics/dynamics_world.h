@@ -12,6 +12,7 @@
 
 namespace rikiseki::world {
 
+class PushBudget;
 class SoftSurface;
 
 /// An impulse on one body, as a velocity kick.
@@ -28,6 +29,7 @@ struct PlacedImpulse {
   Vec3 impulse = Vec3::Zero();          // N s, in W
   Vec3 angular_impulse = Vec3::Zero();  // N m s, about the world origin, in W
   std::optional<Vec3> point = {};       // m, where it acted, if that is known, in W
+  PushBudget* budget = nullptr;         // that bounds what of it the body takes
 };
 
 /// What has gone away from where it was pushed is pushed at its nearest place, within `reach_m` of its

@@ -398,5 +398,32 @@ TEST_CASE("what was booked in a tick is what the channels grew by") {
   }
 }
 
+// Two surfaces that all but face each other: the finger is where the wedge opens, and each pushes with what would
+// be 168 kN if the sum, which is what is displayed, were not cut to 10 N.
+TEST_CASE("between surfaces that face each other no body gets more than the largest share") {
+  Ledger ledger(kPeriodNs, 4096, 0);
+  REQUIRE(ledger.Open(1, 0, 0, 0));
+  REQUIRE(ledger.Open(2, 0, 0, 0));
+  const std::array<BodyShare, 2> shares = {BodyShare{1, 0, Vec3(-2947, 23, -168098), Vec3::Zero()},
+                                           BodyShare{2, 0, Vec3(0.3, -0.6, 168099), Vec3::Zero()}};
+  const Vec3 wanted = shares[0].force + shares[1].force;
+  const Vec3 displayed = 10 * wanted.normalized();
+  ledger.Book({.previous_duration_ns = kPeriodNs,
+               .displayed = displayed,
+               .wanted = shares,
+               .finger = Vec3::Zero(),
+               .largest_share = 10});
+  REQUIRE(ledger.Booked().size() == 2);
+  Vec3 on_bodies = Vec3::Zero();
+  for (const BodyImpulse& push : ledger.Booked()) {
+    CHECK(push.impulse.norm() == Approx(10e-3).epsilon(1e-9));
+    on_bodies += push.impulse;
+  }
+  protocol::HapticTick message;
+  ledger.Write(message);
+  const Vec3 ground = ToVec3(protocol::InSi(message.ground.impulse));
+  CHECK((on_bodies + ground + displayed * 1e-3).norm() < 1e-11);
+}
+
 }  // namespace
 }  // namespace rikiseki::haptic

@@ -19,8 +19,8 @@ TEST_CASE("an impulse about the world origin becomes one about the centre of mas
   // J at p has L = p x J about the origin; about c it must be (p - c) x J.
   const Vec3 p(0.1, -0.2, 0.3), c(1, 2, -3), j(0.5, 0.25, -1);
   const std::vector<BodyState> states = {{.pose = {.position = c}}};
-  const std::vector<PlacedImpulse> owed = {
-      {.body = 0, .impulse = j, .angular_impulse = p.cross(j)}};
+  const std::vector<OwedPush> owed = {
+      {.push = {.body = 0, .impulse = j, .angular_impulse = p.cross(j)}}};
   const std::vector<Kick> kicks = ImpulseKicks(owed, states);
   REQUIRE(kicks.size() == 1);
   CHECK(kicks[0].impulse == j);

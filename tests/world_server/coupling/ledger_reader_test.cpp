@@ -141,10 +141,10 @@ TEST_CASE("the first message of an epoch is a baseline: nothing of it is owed") 
   CHECK(reader.Consume(Message(41, {On(0, 1700), On(1, 50, 41)})));
   const auto owed = reader.Take();
   REQUIRE(owed.size() == 2);
-  CHECK(owed[0].impulse.x() == Approx(700e-12));
-  CHECK(owed[0].angular_impulse.y() == Approx(1400e-12));
-  CHECK(owed[1].body == 1);
-  CHECK(owed[1].impulse.x() == Approx(50e-12));
+  CHECK(owed[0].push.impulse.x() == Approx(700e-12));
+  CHECK(owed[0].push.angular_impulse.y() == Approx(1400e-12));
+  CHECK(owed[1].push.body == 1);
+  CHECK(owed[1].push.impulse.x() == Approx(50e-12));
   CHECK(reader.epoch_books().applied == ImpulseUnits{750, 0, 0});
 }
 
@@ -211,9 +211,9 @@ TEST_CASE("applied + discarded is what was displayed, exactly, under loss") {
           if (writer.Chance(0.4)) continue;  // lapped
           REQUIRE(reader.Consume(message));
           if (!writer.Chance(0.05)) continue;
-          for (const PlacedImpulse& owed : reader.Take()) {
-            REQUIRE(owed.body < 2);
-            REQUIRE(owed.impulse.norm() <= cap);
+          for (const OwedPush& owed : reader.Take()) {
+            REQUIRE(owed.push.body < 2);
+            REQUIRE(owed.push.impulse.norm() <= cap);
           }
           acked = reader.acked_tick();
           const LedgerBooks& books = reader.epoch_books();
@@ -243,7 +243,7 @@ TEST_CASE("losing messages loses no impulse") {
     for (std::uint64_t tick = 0; tick <= 1000; tick += stride) {
       reader.Consume(Message(tick, {On(0, static_cast<std::int64_t>(tick * tick))}));
     }
-    return reader.Take()[0].impulse.x();
+    return reader.Take()[0].push.impulse.x();
   };
   CHECK(total(1) == total(100));
   CHECK(total(1) == Approx(1e6 * 1e-12).epsilon(1e-15));
@@ -272,7 +272,7 @@ TEST_CASE("no such body, an old generation, and one that cannot move") {
   reader.Consume(Message(2, {On(900, 1, 2), On(0, 10, 2, 3), On(2, 100, 2), On(1, 1000, 2)}));
   const auto owed = reader.Take();
   REQUIRE(owed.size() == 1);
-  CHECK(owed[0].body == 1);
+  CHECK(owed[0].push.body == 1);
   CHECK(Discarded(reader.epoch_books(), DiscardReason::kUnknownBody) == ImpulseUnits{111, 0, 0});
 }
 
@@ -295,12 +295,12 @@ TEST_CASE(
   }
   auto owed = reader.Take();
   REQUIRE(owed.size() == 1);
-  CHECK(owed[0].impulse.x() == Approx(3));
+  CHECK(owed[0].push.impulse.x() == Approx(3));
   CHECK(reader.epoch_books().applied == ImpulseUnits{3 * kOne, 0, 0});
   CHECK(Discarded(reader.epoch_books(), DiscardReason::kGap) == ImpulseUnits{7 * kOne, 0, 0});
   // The next world tick starts afresh.
   reader.Consume(Message(12, {On(0, 11 * kOne)}));
-  CHECK(reader.Take()[0].impulse.x() == Approx(1));
+  CHECK(reader.Take()[0].push.impulse.x() == Approx(1));
   // A push there and back is as much pushing as one there.
   for (std::uint64_t tick = 13; tick <= 22; ++tick) {
     reader.Consume(Message(tick, {On(0, (tick % 2 == 0 ? 11 : 12) * kOne)}));
@@ -317,7 +317,7 @@ TEST_CASE("what is pending survives a new haptic epoch, and belongs to the old o
   CHECK(reader.acked_epoch() == 0);
   reader.Consume(Message(1, {On(0, 5)}));
   reader.Consume(Message(2, {On(0, 8)}));
-  CHECK(reader.Take()[0].impulse.x() == Approx(103e-12));
+  CHECK(reader.Take()[0].push.impulse.x() == Approx(103e-12));
   CHECK(reader.epoch_books().applied == ImpulseUnits{3, 0, 0});
   CHECK(reader.life_books().applied == ImpulseUnits{103, 0, 0});
 }
@@ -345,8 +345,8 @@ TEST_CASE("what is pending for a body that stays the same is applied where it no
     reader.SetBodies({{2, true, 0}, {1, true, 5}});  // 0 is another thing now, 2 is gone
     const auto owed = reader.Take();
     REQUIRE(owed.size() == 1);
-    CHECK(owed[0].body == 5);
-    CHECK(owed[0].impulse.x() == Approx(110e-12));
+    CHECK(owed[0].push.body == 5);
+    CHECK(owed[0].push.impulse.x() == Approx(110e-12));
     CHECK(reader.epoch_books().applied == ImpulseUnits{10, 0, 0});
     CHECK(reader.life_books().applied == ImpulseUnits{110, 0, 0});
     CHECK(Discarded(reader.epoch_books(), DiscardReason::kUnknownBody) == ImpulseUnits{7, 0, 0});
@@ -389,9 +389,9 @@ TEST_CASE("random bytes do no harm") {
     }
     reader.Consume(message);
     if (round % 5 != 0) continue;
-    for (const PlacedImpulse& owed : reader.Take()) {
-      REQUIRE(owed.impulse.norm() <= 2.0);
-      REQUIRE(owed.angular_impulse.norm() <= 20.0);
+    for (const OwedPush& owed : reader.Take()) {
+      REQUIRE(owed.push.impulse.norm() <= 2.0);
+      REQUIRE(owed.push.angular_impulse.norm() <= 20.0);
     }
   }
 }
@@ -428,9 +428,9 @@ TEST_CASE("message by message is the same in all as what is handed out at once")
     std::array<Vec3, 3> angular;
     impulse.fill(Vec3::Zero());
     angular.fill(Vec3::Zero());
-    for (const PlacedImpulse& owed : reader.Take()) {
-      impulse[owed.body] = owed.impulse;
-      angular[owed.body] = owed.angular_impulse;
+    for (const OwedPush& owed : reader.Take()) {
+      impulse[owed.push.body] = owed.push.impulse;
+      angular[owed.push.body] = owed.push.angular_impulse;
     }
     double covered = 0;
     std::uint64_t ticks = 0;
@@ -476,6 +476,51 @@ TEST_CASE("the first moment of a lost block is counted from what was known befor
   REQUIRE(reader.replay().impulses.size() == 1);
   CHECK(reader.replay().impulses[0].impulse.x() == Approx(1));
   CHECK(reader.replay().impulses[0].first_moment.x() == Approx(0.003));
+}
+
+// A finger at x [m] that renders with `stiffness`; messages are 1 ms apart.
+HapticTick Touching(std::uint64_t tick, double x, double stiffness,
+                    const std::vector<Channel>& channels) {
+  HapticTick message = Message(tick, channels);
+  message.start_ns = tick * 1'000'000;
+  message.period_ns = message.previous_duration_ns = 1'000'000;
+  message.stiffness = stiffness;
+  message.pointer_count = 1;
+  message.pointers[0].position = {x, 0, 0};
+  return message;
+}
+
+TEST_CASE("with what a body is owed comes what it cost the finger, and what its spring holds") {
+  LedgerReader reader = MakeReader(Coupling::kLocal);
+  constexpr std::int64_t kMilli = 1'000'000'000;  // 1 mN s: in a tick of 1 ms, 1 N
+  reader.Consume(Touching(1, 0, 2000, {}));
+  reader.Consume(Touching(2, 0.001, 2000, {On(0, 2 * kMilli, 2)}));
+  reader.Consume(Touching(3, 0.004, 2000, {On(0, 6 * kMilli, 2)}));
+  auto owed = reader.Take();
+  REQUIRE(owed.size() == 1);
+  CHECK(owed[0].work_j == Approx(2 * 0.003));  // nothing was held before tick 2
+  CHECK(owed[0].spring_j == Approx((2.0 * 2 + 4 * 4) / (2 * 2000)));
+
+  // The force of the last message before is this world tick's; of lost ones the mean is known.
+  reader.Consume(Touching(4, 0.003, 2000, {On(0, 6 * kMilli, 2)}));
+  reader.Consume(Touching(8, 0.007, 2000, {On(0, 18 * kMilli, 2)}));
+  owed = reader.Take();
+  REQUIRE(owed.size() == 1);
+  CHECK(owed[0].work_j == Approx(4 * -0.001 + 3 * 0.004));
+}
+
+TEST_CASE("what is given back counts as discarded, to the unit") {
+  LedgerReader reader = MakeReader(Coupling::kLocal);
+  reader.Consume(Message(1, {On(0, 0)}));
+  reader.Consume(Message(2, {On(0, 1000)}));
+  reader.Take();
+  CHECK(reader.epoch_books().applied == ImpulseUnits{1000, 0, 0});
+  reader.GiveBack(Vec3(300.4e-12, 0, 0));
+  reader.GiveBack(Vec3(std::numeric_limits<double>::quiet_NaN(), 1e300, 0));
+  for (const LedgerBooks& books : {reader.epoch_books(), reader.life_books()}) {
+    CHECK(books.applied == ImpulseUnits{700, 0, 0});
+    CHECK(Discarded(books, DiscardReason::kGap) == ImpulseUnits{300, 0, 0});
+  }
 }
 
 TEST_CASE("only `local` keeps messages apart, and what goes with a scene is not replayed") {
