@@ -32,6 +32,11 @@ void FileWatch::Watch(const std::vector<std::string>& files) {
   seen_ = known_;
 }
 
+void FileWatch::Add(const std::string& file) {
+  const auto [known, is_new] = known_.try_emplace(file);
+  if (is_new) seen_[file] = known->second = TraceOf(file);
+}
+
 bool FileWatch::Look() {
   Traces now = TracesNow();
   const bool settled = now == seen_;

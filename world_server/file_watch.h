@@ -15,6 +15,9 @@ class FileWatch {
   /// Watches these files from now on. Of one that it watches already, what it has seen stays.
   void Watch(const std::vector<std::string>& files);
 
+  /// Watches this one too, likewise.
+  void Add(const std::string& file);
+
   /// Looks. True, once, when a file is not as it was when it was accepted or reported, and all are as
   /// at the look before: whoever writes has finished, as far as can be told. One that is not there
   /// is so too.

@@ -194,7 +194,7 @@ int Run(int argc, char** argv) {
                settings.loop.rate_hz, scene.name, scene.bodies.size(), kBuild);
   SceneAnnouncer announcer(owner, UseOf(settings), body_room);
   announcer.Publish(step);
-  SceneReload scene_reload(settings, std::move(ready.loaded.files));
+  SceneReload scene_reload(settings, std::move(ready.watch));
   Reload reload(options.config, overrides, settings.loop, values, scene_reload);
   RunUntilStopped(settings, step, loop, link, announcer, scene_reload, reload);
   spdlog::info("stopped");

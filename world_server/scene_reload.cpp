@@ -13,16 +13,18 @@ constexpr std::chrono::milliseconds kLook(250);
 
 }  // namespace
 
-ReadyScene LoadScene(const Settings& settings) {
+ReadyScene LoadScene(const Settings& settings, FileWatch watch) {
   ReadyScene ready;
+  ready.watch = std::move(watch);
+  ready.watch.Add(settings.scene.file);
   ready.loaded = LoadSdf(settings.scene.file);
+  ready.watch.Watch(ready.loaded.files);
   ready.dynamics = MakeDynamics(ready.loaded.scene, settings.physics.substep_ms * 1e-3);
   return ready;
 }
 
-SceneReload::SceneReload(const Settings& settings, std::vector<std::string> files)
-    : settings_(settings) {
-  watch_.Watch(files);
+SceneReload::SceneReload(const Settings& settings, FileWatch watch)
+    : settings_(settings), watch_(std::move(watch)) {
   thread_ = std::thread([this] { Work(); });
 }
 
@@ -86,8 +88,8 @@ bool SceneReload::IsNews(Result& result, std::unique_lock<std::mutex>& lock) {
 SceneReload::Result SceneReload::Read(Replacement how) {
   Result result;
   try {
-    ReadyScene ready = LoadScene(settings_);
-    watch_.Watch(ready.loaded.files);
+    ReadyScene ready = LoadScene(settings_, watch_);
+    watch_ = std::move(ready.watch);
     result.successor = Successor{
         .scene = std::move(ready.loaded.scene), .dynamics = std::move(ready.dynamics), .how = how};
     result.warnings = std::move(ready.loaded.warnings);

@@ -23,10 +23,13 @@ namespace rikiseki::world {
 struct ReadyScene {
   LoadedScene loaded;
   std::unique_ptr<DynamicsWorld> dynamics;
+  FileWatch watch;  // of the files that it was read from
 };
 
-/// What the settings name. Throws ConfigError, or std::invalid_argument where the engine refuses.
-ReadyScene LoadScene(const Settings& settings);
+/// What the settings name. Throws ConfigError, or std::invalid_argument where the engine refuses. `watch` is
+/// what the caller watches already: a change of these, and of the scene's own file, while they are read is
+/// told by the watch that comes back.
+ReadyScene LoadScene(const Settings& settings, FileWatch watch = {});
 
 /// What became of reading the scene again.
 struct ReloadReport {
@@ -37,8 +40,8 @@ struct ReloadReport {
 
 class SceneReload {
  public:
-  /// `files` are those that the running scene was read from; they are watched if the settings say so.
-  SceneReload(const Settings& settings, std::vector<std::string> files);
+  /// `watch`: of the running scene; its files are looked at if the settings say so.
+  SceneReload(const Settings& settings, FileWatch watch);
   ~SceneReload();
   SceneReload(const SceneReload&) = delete;
   SceneReload& operator=(const SceneReload&) = delete;

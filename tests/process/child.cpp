@@ -85,6 +85,25 @@ std::string Child::Stderr() const {
   return text.str();
 }
 
+Usage UsageOf(pid_t process) {
+  Usage usage;
+  const std::string folder = "/proc/" + std::to_string(process);
+  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder + "/fd")) {
+    ++usage.descriptors;
+  }
+  std::ifstream maps(folder + "/maps");
+  for (std::string line; std::getline(maps, line);) {
+    ++usage.mappings;
+    if (line.find("/dev/shm/rikiseki.") != std::string::npos) ++usage.segments;
+  }
+  std::ifstream status(folder + "/status");
+  for (std::string word; status >> word;) {
+    if (word == "VmRSS:") status >> usage.resident_kib;
+    if (word == "Threads:") status >> usage.threads;
+  }
+  return usage;
+}
+
 std::string Program(const std::string& name) {
   return std::string(RIKISEKI_BIN_DIR) + "/" + name;
 }

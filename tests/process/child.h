@@ -40,6 +40,16 @@ class Child {
   std::string stderr_path_;
 };
 
+/// What a process holds.
+struct Usage {
+  long descriptors = 0;
+  long mappings = 0;
+  long segments = 0;  // mappings of segments, deleted ones too
+  long threads = 0;
+  long resident_kib = 0;
+};
+Usage UsageOf(pid_t process);
+
 /// A program of this build.
 std::string Program(const std::string& name);
 

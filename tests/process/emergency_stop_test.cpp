@@ -1,12 +1,6 @@
 // The emergency stop of a real haptic_server: by signal and by key, in contact and before there is
 // any; latched, and back through the soft start.
-#include <fcntl.h>
 #include <signal.h>
-#include <stdlib.h>
-#include <sys/ioctl.h>
-#include <sys/wait.h>
-#include <termios.h>
-#include <unistd.h>
 
 #include <catch2/catch.hpp>
 #include <chrono>
@@ -14,6 +8,7 @@
 
 #include "tests/process/child.h"
 #include "tests/process/observer.h"
+#include "tests/process/terminal.h"
 
 namespace {
 
@@ -72,60 +67,6 @@ void CheckStoppedAtOnce(const std::vector<WatchedTick>& ticks) {
   }
   CHECK(stopped);
 }
-
-// haptic_server with a terminal of its own.
-class OnTerminal {
- public:
-  explicit OnTerminal(const std::vector<std::string>& command) {
-    master_ = posix_openpt(O_RDWR | O_NOCTTY);
-    REQUIRE(master_ >= 0);
-    REQUIRE(grantpt(master_) == 0);
-    REQUIRE(unlockpt(master_) == 0);
-    const std::string slave = ptsname(master_);
-    pid_ = fork();
-    if (pid_ == 0) {
-      setsid();
-      const int terminal = open(slave.c_str(), O_RDWR);  // becomes the controlling one
-      dup2(terminal, STDIN_FILENO);
-      dup2(terminal, STDOUT_FILENO);
-      dup2(terminal, STDERR_FILENO);
-      std::vector<char*> arguments;
-      for (const std::string& argument : command) {
-        arguments.push_back(const_cast<char*>(argument.c_str()));
-      }
-      arguments.push_back(nullptr);
-      execv(arguments[0], arguments.data());
-      _exit(127);
-    }
-  }
-  ~OnTerminal() {
-    if (pid_ > 0) {
-      kill(pid_, SIGKILL);
-      waitpid(pid_, nullptr, 0);
-    }
-    close(master_);
-  }
-  OnTerminal(const OnTerminal&) = delete;
-  OnTerminal& operator=(const OnTerminal&) = delete;
-
-  void Press(char key) const { REQUIRE(write(master_, &key, 1) == 1); }
-  bool Echoes() const {
-    termios settings{};
-    REQUIRE(tcgetattr(master_, &settings) == 0);
-    return (settings.c_lflag & ECHO) != 0;
-  }
-  int Terminate() {
-    kill(pid_, SIGTERM);
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = 0;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-
- private:
-  int master_ = -1;
-  pid_t pid_ = 0;
-};
 
 }  // namespace
 
@@ -203,6 +144,7 @@ TEST_CASE("keys of the terminal stop, enable and clutch, and it gets its setting
   haptic.Press('c');
   CHECK(Eventually([&] { return watch.Latest().reason != ForceReason::kClutched; }, 5));
   CheckSafe(watch);
-  CHECK(haptic.Terminate() == 0);
+  haptic.Signal(SIGTERM);
+  CHECK(haptic.Wait() == 0);
   CHECK(haptic.Echoes());
 }

@@ -64,6 +64,21 @@ std::optional<std::uint64_t> TimeToZero(const std::vector<WatchedTick>& ticks,
   return std::nullopt;
 }
 
+// Within one frame of the world the force follows the finger from tick to tick. A force at the rate of the
+// world would not change at all there; a finger that rests or a force at the cap does not either.
+void CheckHapticRate(const std::vector<WatchedTick>& ticks) {
+  std::size_t pairs = 0;
+  std::size_t changes = 0;
+  for (std::size_t i = 1; i < ticks.size(); ++i) {
+    if (ticks[i].world_frame != ticks[i - 1].world_frame) continue;
+    if (ticks[i].force < 0.1 || ticks[i - 1].force < 0.1) continue;
+    ++pairs;
+    if (ticks[i].force != ticks[i - 1].force) ++changes;
+  }
+  CHECK(changes > 0);
+  CHECK(changes > pairs / 10);
+}
+
 // A block that the finger pushes along +x cannot have more momentum than the world says it applied.
 void CheckNotKicked(const protocol::PeerView& world) {
   const protocol::Body body = ReadMovingBody(world);
@@ -99,6 +114,7 @@ TEST_CASE("the pair couples in both orders of start and delivers what it display
     REQUIRE(Eventually([&] { return watch.Latest().finger_x < -0.045; }));
     SettledBooks(*haptic_view);
     CheckSafe(watch);
+    CheckHapticRate(watch.All());
   }
   haptic->Signal(SIGTERM);
   world->Signal(SIGTERM);
@@ -243,6 +259,34 @@ TEST_CASE("haptic_server stopped in contact lets the force fade: no step above t
   REQUIRE(Eventually([&] { return watch.Latest().reason == ForceReason::kStopped; }));
   CHECK(watch.Latest().force < kZeroForce);
   CheckSafe(watch);
+}
+
+TEST_CASE("two pairs side by side: what happens to one is nothing to the other") {
+  const Instance one;
+  const Instance other;
+  Child haptic_one(HapticCommand(one));
+  Child haptic_other(HapticCommand(other));
+  Child world_one(WorldCommand(one));
+  Child world_other(WorldCommand(other));
+  TickWatch watch_one(one, kSlewLimit);
+  TickWatch watch_other(other, kSlewLimit);
+  const auto view_one = Observe(one, Role::kHaptic);
+  const auto view_other = Observe(other, Role::kHaptic);
+  const auto world_view = Observe(other, Role::kWorld);
+  REQUIRE(WaitForPush(watch_one));
+  REQUIRE(WaitForPush(watch_other));
+  world_one.Signal(SIGKILL);
+  world_one.Wait();
+  CHECK(Eventually([&] { return watch_one.Latest().reason == ForceReason::kWorldAbsent; }));
+  CHECK(ReadHapticHealth(*view_one).peer_state != PeerState::kLive);
+  world_other.Signal(SIGHUP);  // the block back to where it can be pushed
+  REQUIRE(WaitForPush(watch_other));
+  REQUIRE(Eventually([&] { return watch_other.Latest().finger_x < -0.045; }));
+  CHECK(ReadHapticHealth(*view_other).peer_epoch == world_view->epoch());
+  CHECK(Norm(SettledBooks(*view_other).peer_lost) == 0);
+  CHECK(Norm(ReadWorldHealth(*world_view).applied) > 0);
+  CheckSafe(watch_one);
+  CheckSafe(watch_other);
 }
 
 TEST_CASE("a second daemon of the same role is refused, and the first goes on") {

@@ -86,6 +86,13 @@ TEST_CASE("what changed while it was read is told after the files are watched ag
   const std::string b = folder.Write("b", "1");
   watch.Watch({a, b});
   CHECK(TwoLooks(watch));
+  // Of a file that is about to be read for the first time, too.
+  const std::string c = folder.Write("c", "1");
+  watch.Add(c);
+  watch.Add(a);
+  folder.Write("c", "22");
+  watch.Watch({a, b, c});
+  CHECK(TwoLooks(watch));
   watch.Watch({b});
   folder.Write("a", "4444");
   CHECK_FALSE(TwoLooks(watch));

@@ -27,12 +27,15 @@ std::string World(const std::string& content) {
 // A step that runs what was loaded, and the reload beside it.
 class Running {
  public:
-  explicit Running(const std::string& path, bool watch = true)
+  // `meanwhile` is called when the scene is loaded and does not run yet.
+  explicit Running(
+      const std::string& path, bool watch = true, const std::function<void()>& meanwhile = [] {})
       : settings_(SettingsFor(path, watch)) {
     ReadyScene ready = LoadScene(settings_);
+    meanwhile();
     step_ =
         std::make_unique<WorldStep>(settings_, ready.loaded.scene, std::move(ready.dynamics), 0);
-    reload_ = std::make_unique<SceneReload>(settings_, ready.loaded.files);
+    reload_ = std::make_unique<SceneReload>(settings_, std::move(ready.watch));
   }
 
   std::optional<ReloadReport> WaitForReport(double seconds = 20) {
@@ -93,6 +96,16 @@ TEST_CASE("a changed file changes the running scene, a broken one is named and l
   folder.Rename("scene.sdf", World(Ball("b", 1)));
   CHECK_FALSE(world.WaitForReport(1));
   CHECK(world.step().health().resets == 2);
+}
+
+TEST_CASE("a file that changes while the server starts is noticed") {
+  const TemporaryFolder folder;
+  const std::string path = folder.Write("scene.sdf", World(Ball("a", 0)));
+  Running world(path, true,
+                [&] { folder.Rename("scene.sdf", World(Ball("a", 0) + Ball("b", 1))); });
+  const auto report = world.WaitForReport();
+  REQUIRE(report);
+  CHECK(world.step().Bodies().size() == 2);
 }
 
 TEST_CASE("an included model is watched too, and what is asked for starts everything anew") {
