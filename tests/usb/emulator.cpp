@@ -1,7 +1,7 @@
 // usb_emulator: a Cyverse board with strings and a hand behind it, for the whole, unmodified daemon:
 //
 //   umockdev-wrapper usb_emulator --config haptic_server.ini --control SOCKET
-//       [--set device.file=... ] [--switch N] [--tick-us US] [--on-request]
+//       [--set device.file=... ] [--switch N] [--tick-us US] [--on-request] [--middle-ticks N]
 //   UMOCKDEV_DIR=<what `root` answers> umockdev-wrapper haptic_server --device usb ...
 //
 // It listens on a socket for one command a line, and answers each with one line (Commands below). The
@@ -37,7 +37,6 @@ using namespace rikiseki;        // NOLINT(google-build-using-namespace)
 using namespace rikiseki::test;  // NOLINT(google-build-using-namespace)
 
 constexpr std::int64_t kSilenceNs = 100'000'000;
-constexpr int kTicksInTheMiddle = 100;
 
 struct Options {
   std::string config;
@@ -46,6 +45,7 @@ struct Options {
   int switch_id = 5;
   int tick_us = 1000;
   bool on_request = false;
+  int middle_ticks = 100;
 };
 
 // A board on the bus: firmware, hand and the clock of the hand. Guarded by `mutex`.
@@ -65,7 +65,7 @@ class BoardOnBus {
                   settings.usb.board == haptic::UsbBoardModel::kSh4 ? 0x0205 : 0x0203),
               .number = number},
              [this](const std::vector<std::uint8_t>& packet) { return Answer(packet); }) {
-    board_.HoldInTheMiddle(kTicksInTheMiddle, tick_ns_);
+    board_.HoldInTheMiddle(options.middle_ticks, tick_ns_);
   }
 
   EmulatedBoard& board() { return board_; }
@@ -239,7 +239,8 @@ int Run(int argc, char** argv) {
       "control", po::value(&options.control)->required(), "socket for commands")(
       "switch", po::value(&options.switch_id), "where the rotary switch stands")(
       "tick-us", po::value(&options.tick_us), "that the hand moves on by a tick")(
-      "on-request", po::bool_switch(&options.on_request), "the hand waits for `begin`");
+      "on-request", po::bool_switch(&options.on_request), "the hand waits for `begin`")(
+      "middle-ticks", po::value(&options.middle_ticks), "for which the hand stays there first");
   ParseCommandLine(argc, argv, line);
   options.set.emplace_back("device.kind=usb");
   const haptic::Settings settings = haptic::LoadSettings(options.config, options.set);
