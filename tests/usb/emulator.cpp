@@ -1,4 +1,5 @@
-// usb_emulator: a Cyverse board with strings and a hand behind it, for the whole, unmodified daemon:
+// usb_emulator: a Cyverse board with strings and a hand behind it, or a SPIDAR-mouse, for the whole,
+// unmodified daemon:
 //
 //   umockdev-wrapper usb_emulator --config haptic_server.ini --control SOCKET
 //       [--set device.file=... ] [--switch N] [--tick-us US] [--on-request] [--middle-ticks N]
@@ -29,6 +30,7 @@
 #include "common/command_line.h"
 #include "common/daemon.h"
 #include "tests/usb/emulated_board.h"
+#include "tests/usb/emulated_mouse.h"
 #include "tests/usb/usbfs.h"
 
 namespace {
@@ -110,6 +112,9 @@ class Emulator {
         second_(testbed, mutex_, settings, options, 3),
         blank_(testbed, mutex_, {.vendor = 0x04B4, .product = 0x8613, .number = 4},
                [](const auto&) { return std::nullopt; }),
+        mouse_bus_(testbed, mutex_,
+                   {.vendor = 0x04D8, .product = 0x003F, .number = 5, .is_hid = true},
+                   [this](const auto& packet) { return mouse_.Handle(packet, 0); }),
         clock_([this] {
           while (!stop_) {
             SleepUntil(MonotonicNow() + 1'000'000);
@@ -140,7 +145,9 @@ class Emulator {
         {"plug_second", [&] { second_.bus().Plug(); }},
         {"unplug_second", [&] { second_.bus().Unplug(); }},
         {"plug_blank", [&] { blank_.Plug(); }},
-        {"unplug_blank", [&] { blank_.Unplug(); }}};
+        {"unplug_blank", [&] { blank_.Unplug(); }},
+        {"plug_mouse", [&] { mouse_bus_.Plug({}, what != "forbidden"); }},
+        {"unplug_mouse", [&] { mouse_bus_.Unplug(); }}};
     const std::map<std::string, std::function<void()>> locked = {
         {"begin", [&] { board.Begin(); }},
         {"forget", [&] { board.ForgetCounters(); }},  // the power was away as well
@@ -164,6 +171,7 @@ class Emulator {
       return text;
     }
     if (verb == "status") return Status();
+    if (verb == "mouse_status") return MouseStatus();
     if (const auto found = outside.find(verb); found != outside.end()) {
       found->second();
     } else if (const auto inside = locked.find(verb); inside != locked.end()) {
@@ -187,11 +195,22 @@ class Emulator {
     return text.str();
   }
 
+  // started, force x and y [N], forces, stops, nonsense
+  std::string MouseStatus() {
+    const std::lock_guard lock(mutex_);
+    std::ostringstream text;
+    text << mouse_.is_started() << " " << mouse_.force()[0] << " " << mouse_.force()[1] << " "
+         << mouse_.forces() << " " << mouse_.stops() << " " << mouse_.nonsense();
+    return text.str();
+  }
+
   UMockdevTestbed* testbed_;
   std::mutex mutex_;
   BoardOnBus first_;
   BoardOnBus second_;
   UsbFs blank_;
+  EmulatedMouse mouse_;
+  UsbFs mouse_bus_;
   std::atomic<bool> stop_{false};
   std::thread clock_;
 };
