@@ -14,7 +14,7 @@
 #include "common/clock.h"
 #include "common/histogram.h"
 #include "common/realtime.h"
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/loop.h"
 
 namespace rikiseki::haptic {

@@ -1,6 +1,6 @@
 #include "haptic_server/device/usb/usb_device.h"
 
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/device/usb/libusb_port.h"
 #include "haptic_server/device/usb/usb_board.h"
 #include "haptic_server/device/usb/usb_error.h"
@@ -10,7 +10,7 @@ namespace rikiseki::haptic {
 
 std::unique_ptr<Device> OpenDevice(const Settings& settings) {
   if (settings.device.kind != DeviceKind::kUsb) return MakeDevice(settings);
-  return std::make_unique<Spidar>(settings.spidar, OpenUsbBoard(settings));
+  return MakeSpidar(settings.spidar, OpenUsbBoard(settings));
 }
 
 std::unique_ptr<MotorBoard> OpenUsbBoard(const Settings& settings) {
