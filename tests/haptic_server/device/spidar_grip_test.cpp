@@ -72,7 +72,9 @@ TEST_CASE("the grip is measured where it is, how it is turned, and how fast both
   const Vec3 turning = 6 * Vec3(0.48, 0.6, -0.64);  // rad/s
   for (int k = 0; k <= 100; ++k) {
     const double t = 1e-3 * k;
-    const Pose pose{t * velocity, Quat(Eigen::AngleAxisd(6 * t, turning / 6))};
+    // From a turn about another axis: rates are told in device axes, not in the grip's.
+    const Pose pose{t * velocity, Eigen::AngleAxisd(6 * t, turning / 6) *
+                                      Quat(Eigen::AngleAxisd(-0.4, Vec3::UnitY()))};
     REQUIRE(rig.Read(pose) == DeviceStatus::kOk);
     REQUIRE((rig.sample.position - pose.position).norm() <= kG6X3CountLength);
     REQUIRE(rig.sample.orientation.angularDistance(pose.orientation) <=
