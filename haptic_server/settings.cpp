@@ -4,6 +4,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "haptic_server/device/spidar_grip.h"
 #include "haptic_server/device/spidar_kinematics.h"
 #include "haptic_server/device/tension.h"
 
@@ -142,13 +143,17 @@ ConfigSchema DeviceSchema(Settings& settings) {
   }
   AddUsbKeys(schema, settings.usb);
   schema.Vectors("spidar.motors_m", &spidar.motors_m, -10, 10,
-                 "Where the four strings leave their motors, device axes.");
+                 "Where the strings leave their motors, device axes: four, or eight.");
+  schema.Vectors("spidar.attachments_mm", &spidar.attachments_mm, -1000, 1000,
+                 "Where eight strings end on the grip, from its centre, upright in the middle.");
   schema.Number("spidar.count_length_m", &spidar.count_length_m, 1e-7, 1e-3,
                 "String length per encoder count.");
   schema.Number("spidar.tension_min_n", &spidar.tension_min_n, 0, 10,
                 "Tension that keeps a string from going slack.");
   schema.Number("spidar.tension_max_n", &spidar.tension_max_n, 0.1, 100,
                 "The most a motor may pull.");
+  schema.Number("spidar.rest_tension_n", &spidar.rest_tension_n, 0, 100,
+                "Tension of each of eight strings where no force is displayed.");
   return schema;
 }
 
@@ -172,19 +177,54 @@ std::optional<Conflict> FindConflict(const Settings& settings) {
   return std::nullopt;
 }
 
-std::optional<Conflict> FindConflict(const SpidarSettings& spidar) {
-  if (spidar.motors_m.size() != kTensionStrings) {
-    return Conflict{"spidar.motors_m", "exactly 4 motors are expected"};
-  }
+std::optional<Conflict> FindPointConflict(const SpidarSettings& spidar) {
   try {
     const SpidarKinematics kinematics(spidar.motors_m);
   } catch (const std::invalid_argument& error) {
     return Conflict{"spidar.motors_m", error.what()};
   }
+  const std::string why =
+      "of 4 motors the strings meet in one point: leave it out, or give 8 motors";
+  if (!spidar.attachments_mm.empty()) return Conflict{"spidar.attachments_mm", why};
+  if (spidar.rest_tension_n != 0) return Conflict{"spidar.rest_tension_n", why};
+  return std::nullopt;
+}
+
+std::optional<Conflict> FindGripConflict(const SpidarSettings& spidar) {
+  if (spidar.attachments_mm.size() != kGripStrings) {
+    return Conflict{"spidar.attachments_mm", "8 places are expected, one for each motor"};
+  }
+  const TensionBounds bounds{spidar.tension_min_n, spidar.tension_max_n};
+  if (!(bounds.min_n <= spidar.rest_tension_n && spidar.rest_tension_n <= bounds.max_n)) {
+    return Conflict{"spidar.rest_tension_n",
+                    "it must lie between spidar.tension_min_n and spidar.tension_max_n"};
+  }
+  try {
+    const GripStrings home = GripKinematics(spidar).StringsAt(Pose());
+    if (!AllocateWrench(home, {}, bounds, spidar.rest_tension_n).feasible) {
+      return Conflict{
+          "spidar.attachments_mm",
+          "strings that pull cannot hold the grip still in the middle: check which motor "
+          "pulls at which place"};
+    }
+  } catch (const std::invalid_argument& error) {
+    return Conflict{"spidar.attachments_mm", error.what()};
+  }
+  return std::nullopt;
+}
+
+std::optional<Conflict> FindConflict(const SpidarSettings& spidar) {
   if (!(spidar.tension_min_n < spidar.tension_max_n)) {
     return Conflict{"spidar.tension_max_n", "it must exceed spidar.tension_min_n"};
   }
-  return std::nullopt;
+  switch (spidar.motors_m.size()) {
+    case kTensionStrings:
+      return FindPointConflict(spidar);
+    case kGripStrings:
+      return FindGripConflict(spidar);
+    default:
+      return Conflict{"spidar.motors_m", "exactly 4 motors, or 8, are expected"};
+  }
 }
 
 // What a SPIDAR-mouse wants of the loop.
@@ -253,9 +293,9 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
     device.Refuse(conflict->key, conflict->why);
   }
   if (settings.device.kind == DeviceKind::kUsb) {
-    const auto conflict =
-        FindUsbConflict(settings.usb, kTensionStrings, settings.spidar.tension_max_n,
-                        1e-3 * static_cast<double>(settings.period_ns()));
+    const auto conflict = FindUsbConflict(settings.usb, settings.spidar.motors_m.size(),
+                                          settings.spidar.tension_max_n,
+                                          1e-3 * static_cast<double>(settings.period_ns()));
     if (conflict) device.Refuse(conflict->key, conflict->why);
   }
   if (settings.device.kind == DeviceKind::kMouse) {

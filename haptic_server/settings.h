@@ -90,9 +90,12 @@ struct HandSettings {
 /// Longer than this no device file may say that a force takes to come.
 inline constexpr double kLongestLatencyUs = 10'000;
 
-/// Motor positions and electronics of a 4-string SPIDAR. notes of config/devices/*.ini.
+/// Motor positions and electronics of a SPIDAR of 4 strings, which meet in one point, or 8, which hold a
+/// grip. notes of config/devices/*.ini.
 struct SpidarSettings {
   std::vector<Vec3> motors_m;          // in device axes
+  std::vector<Vec3> attachments_mm;    // of 8 strings: where they end, in grip axes; else none
+  double rest_tension_n = 0;           // of 8 strings: what each has without a force; else 0
   double count_length_m = 2.92406e-5;  // string length per encoder count
   double tension_min_n = 0.5;
   double tension_max_n = 20;

@@ -43,6 +43,7 @@ std::int64_t ElapsedTicks(const TickTime& time) {
 
 bool IsSound(const DeviceSample& sample) {
   return sample.position.allFinite() && sample.velocity.allFinite() &&
+         sample.orientation.coeffs().allFinite() && sample.angular_velocity.allFinite() &&
          sample.position.cwiseAbs().maxCoeff() <= kLargestCoordinate;
 }
 
@@ -146,6 +147,8 @@ bool HapticStep::State::TakeSample(DeviceSample measured, bool clutched) noexcep
   if (!IsSound(measured)) return false;
   FlushDenormals(measured.position);
   FlushDenormals(measured.velocity);
+  measured.orientation = mapping.OrientationInWorld(measured.orientation);
+  measured.angular_velocity = mapping.DirectionInWorld(measured.angular_velocity);
   measured.target = mapping.PointInWorld(measured.target);
   if (!measured.target.allFinite()) measured.target = measured.position;
   sample = measured;
@@ -210,6 +213,10 @@ void HapticStep::State::Publish(const TickTime& time, const Vec3& force, ForceRe
   pointer.position = ToArray(sample.position);
   pointer.velocity = ToArray(sample.velocity);
   pointer.force = ToArray(force);
+  pointer.orientation = ToArray(sample.orientation);
+  pointer.angular_velocity = ToArray(sample.angular_velocity);
+  const Vec3 torque = mapping.TorqueInWorld(device.torque());
+  if (torque.allFinite()) pointer.torque = ToArray(torque);
   ledger.Write(message);
 
   health.ticks = tick + 1;

@@ -1,5 +1,5 @@
 // The force display as the haptic loop sees it: one measurement in, one force out, every tick.
-// Behind it stand SPIDARs (spidar.h, over simulated or real motor boards) and the laboratory's
+// Behind it stand SPIDARs (make_device.h, over simulated or real motor boards) and the laboratory's
 // ideal one.
 #pragma once
 
@@ -17,8 +17,10 @@ enum class DeviceStatus : std::uint8_t {
 
 /// Where the finger is, in device coordinates (SI units).
 struct DeviceSample {
-  Vec3 position = Vec3::Zero();  // m, centre of the finger
-  Vec3 velocity = Vec3::Zero();  // m/s, as estimated by the device's own filter
+  Vec3 position = Vec3::Zero();          // m, centre of the finger
+  Vec3 velocity = Vec3::Zero();          // m/s, as estimated by the device's own filter
+  Quat orientation = Quat::Identity();   // of the grip, where the device measures it
+  Vec3 angular_velocity = Vec3::Zero();  // rad/s, likewise
   Vec3 target =
       Vec3::Zero();     // m, where a simulated hand wants to be; the position on real devices
   bool enabled = true;  // the enable input (foot switch, stop button) is closed, or there is none
@@ -34,6 +36,10 @@ class Device {
   /// Displays `force` [N, on the user, device axes] until the next call. Returns the force that is
   /// really displayed after the device's own limits. // RT:
   virtual Vec3 Write(const Vec3& force) noexcept = 0;
+
+  /// The torque [N m, on the user, device axes, about the finger's centre] that Write displayed beside
+  /// the force: none is ever asked for, but a device at its limits may not be able to do without. // RT:
+  virtual Vec3 torque() const noexcept { return Vec3::Zero(); }
 
   /// Lets go: zero force, minimum tension. Called on every way out, and in every tick of an emergency
   /// stop. // RT:

@@ -39,7 +39,20 @@ Vec3 Mapping::PointInWorld(const Vec3& point) const noexcept {
 }
 
 Vec3 Mapping::VelocityInWorld(const Vec3& velocity) const noexcept {
-  return motion_scale_ * (rotated_ ? Vec3(rotation_ * velocity) : velocity);
+  return motion_scale_ * DirectionInWorld(velocity);
+}
+
+Vec3 Mapping::DirectionInWorld(const Vec3& direction) const noexcept {
+  return rotated_ ? Vec3(rotation_ * direction) : direction;
+}
+
+Quat Mapping::OrientationInWorld(const Quat& orientation) const noexcept {
+  const Vec3 turned = DirectionInWorld(orientation.vec());
+  return {orientation.w(), turned.x(), turned.y(), turned.z()};
+}
+
+Vec3 Mapping::TorqueInWorld(const Vec3& torque) const noexcept {
+  return motion_scale_ * ForceInWorld(torque);
 }
 
 Vec3 Mapping::PointOnDevice(const Vec3& point) const noexcept {
@@ -51,7 +64,7 @@ Vec3 Mapping::VelocityOnDevice(const Vec3& velocity) const noexcept {
 }
 
 Vec3 Mapping::ForceInWorld(const Vec3& force) const noexcept {
-  return (rotated_ ? Vec3(rotation_ * force) : force) / force_scale_;
+  return DirectionInWorld(force) / force_scale_;
 }
 
 Vec3 Mapping::ForceOnDevice(const Vec3& force) const noexcept {

@@ -27,6 +27,12 @@ class Mapping {
   Vec3 ForceInWorld(const Vec3& force) const noexcept;
   Vec3 ForceOnDevice(const Vec3& force) const noexcept;
 
+  Vec3 DirectionInWorld(const Vec3& direction) const noexcept;
+  /// Upright stays upright: it is the turn of the grip since the middle that is laid into the world.
+  Quat OrientationInWorld(const Quat& orientation) const noexcept;
+  /// About a point that is laid into the world too. Does the work there that force and way do.
+  Vec3 TorqueInWorld(const Vec3& torque) const noexcept;
+
   /// World newtons per device newton: for limits. 1/s_f.
   double force_in_world() const noexcept { return 1 / force_scale_; }
 

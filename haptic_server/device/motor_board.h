@@ -6,14 +6,15 @@
 #include <cstdint>
 #include <string>
 
-#include "haptic_server/device/tension.h"
+#include "haptic_server/device/strings.h"
 
 namespace rikiseki::haptic {
 
 class Hand;
 
 /// Encoder counts, longer strings count up; all are 0 with the grip in the origin of the device.
-using EncoderCounts = std::array<std::int64_t, kTensionStrings>;
+/// Beyond the strings that there are: nothing.
+using EncoderCounts = std::array<std::int64_t, kMaxStrings>;
 
 class MotorBoard {
  public:
@@ -23,7 +24,7 @@ class MotorBoard {
   virtual bool ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept = 0;
 
   /// Pulls with `tension` [N] from now on. False if the board does not answer. // RT:
-  virtual bool WriteTensions(const FourStrings& tension) noexcept = 0;
+  virtual bool WriteTensions(const PerString& tension) noexcept = 0;
 
   /// Whether the enable input was closed at the last ReadCounts; true on a board that has none. //
   /// RT:

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
+
+#include "common/rigid_body.h"
+#include "haptic_server/device/wrench_tension.h"
 
 namespace rikiseki::haptic {
 namespace {
@@ -10,6 +14,18 @@ namespace {
 constexpr std::int64_t kLongestStepNs = 1'000'000;
 
 constexpr int kStirringStrokes = 500;  // then again from the first
+
+// Fingers that hold a grip of some centimetres upright: N m/rad, with half the critical damping.
+constexpr double kWristStiffness = 0.5;
+constexpr double kWristInertia = 5e-5;  // kg m^2, of grip and fingers
+constexpr double kWristDamping = 5e-3;  // N m s/rad
+
+Hand UprightWrist() {
+  return {[](double) { return Vec3(Vec3::Zero()); },
+          {.mass_kg = kWristInertia,
+           .damping_ns_per_m = kWristDamping,
+           .stiffness_n_per_m = kWristStiffness}};
+}
 
 }  // namespace
 
@@ -54,13 +70,43 @@ Hand MakeHand(const Settings& settings) {
 }
 
 SimulatedBoard::SimulatedBoard(const SpidarSettings& spidar, Hand hand)
-    : kinematics_(spidar.motors_m),
-      home_lengths_(kinematics_.Lengths(Vec3::Zero())),
+    : motors_(spidar.motors_m),
+      attachments_(motors_.size(), Vec3::Zero()),
       count_length_m_(spidar.count_length_m),
       bounds_{spidar.tension_min_n, spidar.tension_max_n},
       latency_ns_(std::llround(1e3 * spidar.latency_us)),
-      hand_(std::move(hand)) {
+      hand_(std::move(hand)),
+      wrist_(UprightWrist()) {
+  const std::size_t ends = motors_.size() == kGripStrings ? kGripStrings : 0;
+  if ((motors_.size() != kTensionStrings && ends == 0) || spidar.attachments_mm.size() != ends) {
+    throw std::invalid_argument("a SPIDAR has 4 motors, or 8 with an attachment each");
+  }
+  for (std::size_t string = 0; string < ends; ++string) {
+    attachments_[string] = 1e-3 * spidar.attachments_mm[string];
+  }
+  home_lengths_ = Lengths(Pose());
   tension_.fill(spidar.tension_min_n);
+}
+
+Pose SimulatedBoard::grip() const noexcept {
+  return {hand_.position(), Turned(Quat::Identity(), wrist_.position())};
+}
+
+PerString SimulatedBoard::Lengths(const Pose& grip) const noexcept {
+  PerString lengths{};
+  for (std::size_t string = 0; string < motors_.size(); ++string) {
+    lengths[string] = (motors_[string] - grip * attachments_[string]).norm();
+  }
+  return lengths;
+}
+
+EncoderCounts SimulatedBoard::CountsAt(const Pose& grip) const noexcept {
+  const PerString lengths = Lengths(grip);
+  EncoderCounts counts{};
+  for (std::size_t string = 0; string < motors_.size(); ++string) {
+    counts[string] = std::llround((lengths[string] - home_lengths_[string]) / count_length_m_);
+  }
+  return counts;
 }
 
 // Moves the hand on under the tensions that act now.
@@ -68,12 +114,19 @@ void SimulatedBoard::MoveTo(std::int64_t now_ns) noexcept {
   const std::int64_t elapsed = now_ns - now_ns_;
   const std::int64_t steps = (elapsed + kLongestStepNs - 1) / kLongestStepNs;
   for (std::int64_t i = 0; i < steps; ++i) {
-    const Vec3 position = hand_.position();
+    const Pose pose = grip();
     Vec3 force = Vec3::Zero();
-    for (std::size_t string = 0; string < kTensionStrings; ++string) {
-      force += (kinematics_.motor(string) - position).stableNormalized() * tension_[string];
+    Vec3 torque = Vec3::Zero();
+    for (std::size_t string = 0; string < motors_.size(); ++string) {
+      const Vec3 arm = pose.orientation * attachments_[string];
+      const Vec3 pull =
+          (motors_[string] - pose.position - arm).stableNormalized() * tension_[string];
+      force += pull;
+      torque += arm.cross(pull);
     }
-    hand_.Advance(elapsed * (i + 1) / steps - elapsed * i / steps, force);
+    const std::int64_t step_ns = elapsed * (i + 1) / steps - elapsed * i / steps;
+    hand_.Advance(step_ns, force);
+    wrist_.Advance(step_ns, torque);
   }
   now_ns_ = now_ns;
 }
@@ -89,16 +142,13 @@ bool SimulatedBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noex
     tension_ = next.tension;
   }
   MoveTo(now_ns);
-  const PerString lengths = kinematics_.Lengths(hand_.position());
-  for (std::size_t string = 0; string < kTensionStrings; ++string) {
-    counts[string] = std::llround((lengths[string] - home_lengths_[string]) / count_length_m_);
-  }
+  counts = CountsAt(grip());
   return true;
 }
 
-bool SimulatedBoard::WriteTensions(const FourStrings& tension) noexcept {
-  FourStrings clamped;
-  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+bool SimulatedBoard::WriteTensions(const PerString& tension) noexcept {
+  PerString clamped{};
+  for (std::size_t string = 0; string < motors_.size(); ++string) {
     clamped[string] = std::clamp(tension[string], bounds_.min_n, bounds_.max_n);
   }
   if (latency_ns_ == 0) {

@@ -2,21 +2,17 @@
 // motor board. Watches that the strings agree with each other: a slack or slipped one is a fault.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 
 #include "haptic_server/device/device.h"
 #include "haptic_server/device/motor_board.h"
 #include "haptic_server/device/spidar_kinematics.h"
-#include "haptic_server/device/velocity_filter.h"
+#include "haptic_server/device/velocity_estimate.h"
+#include "haptic_server/device/wrong_string.h"
 #include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
-
-/// Four strings fix a point with one length to spare; if that one is off by more than this [m], a
-/// string hangs slack or its pulley slipped. Quantisation accounts for less than one count.
-inline constexpr double kSlipResidual = 1e-3;
 
 /// Up to here [m] a position is sound: where the string that is found wrong later is judged from.
 inline constexpr double kSoundResidual = kSlipResidual / 4;
@@ -33,19 +29,11 @@ class Spidar final : public Device {
   }
   std::string Name() const override;
 
-  /// The board's own, else the string that makes Read a fault, counted from 1 as the motors of the
-  /// device file are.
+  /// The board's own, else the string that makes Read a fault.
   std::string Complaint() const override;
   const char* Trouble() const noexcept override { return board_->Trouble(); }
 
  private:
-  // What Complaint says, for it is asked by another thread than Read.
-  struct WrongString {
-    std::int32_t number = 0;  // 0: none
-    float excess_mm = 0;
-  };
-  static_assert(std::atomic<WrongString>::is_always_lock_free);
-
   void Blame(const PerString& lengths) noexcept;
 
   SpidarSettings settings_;
@@ -53,13 +41,10 @@ class Spidar final : public Device {
   SpidarKinematics kinematics_;
   PerString home_lengths_;
   Vec3 position_ = Vec3::Zero();
-  VelocityFilter velocity_;
+  VelocityEstimate velocity_;
   bool located_ = false;  // there was a position before
   Vec3 sound_position_ = Vec3::Zero();
-  std::atomic<WrongString> wrong_string_{WrongString()};
+  WrongString wrong_string_;
 };
-
-/// The device of the settings. Throws StartError if it cannot be had.
-std::unique_ptr<Device> MakeDevice(const Settings& settings);
 
 }  // namespace rikiseki::haptic

@@ -6,19 +6,9 @@
 #include <vector>
 
 #include "common/geometry.h"
+#include "haptic_server/device/strings.h"
 
 namespace rikiseki::haptic {
-
-inline constexpr std::size_t kMaxStrings = 8;
-
-/// One value per string; the first StringCount() count.
-using PerString = std::array<double, kMaxStrings>;
-
-/// A string whose length does not fit the others'.
-struct SuspectString {
-  std::size_t string = 0;
-  double excess_m = 0;  // measured too long (it hangs slack or slipped off) or, if < 0, too short
-};
 
 class SpidarKinematics {
  public:

@@ -6,7 +6,7 @@
 #include <cstddef>
 
 #include "common/geometry.h"
-#include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/device/strings.h"
 #include "haptic_server/device/wrench_tension.h"
 
 namespace rikiseki::haptic {

@@ -5,12 +5,13 @@
 #include <cstddef>
 
 #include "common/geometry.h"
+#include "haptic_server/device/strings.h"
 #include "haptic_server/device/tension.h"
 
 namespace rikiseki::haptic {
 
-inline constexpr std::size_t kGripStrings = 8;
-using EightStrings = std::array<double, kGripStrings>;
+inline constexpr std::size_t kGripStrings = kMaxStrings;
+using EightStrings = PerString;
 
 /// How the strings hold the grip in one pose, device axes.
 struct GripStrings {

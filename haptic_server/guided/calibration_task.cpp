@@ -56,7 +56,7 @@ bool CalibrationTask::Tick(const TickTime& time, const OperatorInput&) noexcept 
 
 void CalibrationTask::Hold(std::int64_t now_ns, const EncoderCounts& counts) noexcept {
   Counts now{};
-  std::copy(counts.begin(), counts.end(), now.begin());
+  std::copy_n(counts.begin(), now.size(), now.begin());
   if (held_readings_ == 0 || Farthest(now, held_first_) * spidar_.count_length_m > kStill) {
     held_first_ = now;
     held_since_ns_ = now_ns;
@@ -75,7 +75,7 @@ void CalibrationTask::Hold(std::int64_t now_ns, const EncoderCounts& counts) noe
 
 void CalibrationTask::Lead(std::int64_t now_ns, const EncoderCounts& counts) noexcept {
   Counts now{};
-  std::copy(counts.begin(), counts.end(), now.begin());
+  std::copy_n(counts.begin(), now.size(), now.begin());
   const double way = Farthest(now, last_) * spidar_.count_length_m;
   const bool is_slow = way <= kFastest * Seconds(now_ns - last_ns_);
   last_ = now;
@@ -92,7 +92,7 @@ void CalibrationTask::Lead(std::int64_t now_ns, const EncoderCounts& counts) noe
 }
 
 void CalibrationTask::Release() noexcept {
-  FourStrings tension;
+  PerString tension;
   tension.fill(spidar_.tension_min_n);
   board_.WriteTensions(tension);
 }

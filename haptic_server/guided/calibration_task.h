@@ -9,6 +9,7 @@
 
 #include "haptic_server/device/motor_board.h"
 #include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/device/tension.h"
 #include "haptic_server/guided/guided_task.h"
 #include "haptic_server/settings.h"
 

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <stdexcept>
+#include <string>
 
 #include "common/clock.h"
 #include "common/config_edit.h"
@@ -13,6 +14,7 @@
 #include "common/realtime.h"
 #include "haptic_server/device/simulated_board.h"
 #include "haptic_server/device/spidar.h"
+#include "haptic_server/device/tension.h"
 #include "haptic_server/device/usb/usb_device.h"
 #include "haptic_server/guided/calibration_task.h"
 #include "haptic_server/guided/identification_task.h"
@@ -27,12 +29,18 @@ constexpr int kPollMs = 100;
 
 // The simulated hand does what the prompts ask for.
 std::unique_ptr<MotorBoard> OpenBoardFor(Procedure procedure, const Settings& settings) {
-  if (settings.device.kind == DeviceKind::kUsb) return OpenUsbBoard(settings);
   if (settings.device.kind == DeviceKind::kReplay || settings.device.kind == DeviceKind::kMouse) {
     throw StartError(kExitUsage,
                      "a recording has no device, a SPIDAR-mouse no strings that are counted: set "
                      "device.kind to usb or simulated");
   }
+  if (settings.spidar.motors_m.size() != kTensionStrings) {
+    throw StartError(kExitConfig, settings.device.file +
+                                      ": --calibrate, --identify and --z-width know how to guide "
+                                      "devices of 4 strings only, and this one has " +
+                                      std::to_string(settings.spidar.motors_m.size()));
+  }
+  if (settings.device.kind == DeviceKind::kUsb) return OpenUsbBoard(settings);
   try {
     return std::make_unique<SimulatedBoard>(settings.spidar, procedure == Procedure::kCalibrate
                                                                  ? LeadingHand(settings)

@@ -15,7 +15,7 @@
 #include "common/clock.h"
 #include "common/histogram.h"
 #include "common/realtime.h"
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/loop.h"
 #include "protocol/attach.h"
 

@@ -1,7 +1,7 @@
-// What no device of the daemon runs yet, the eight strings, and what happens rarely, on the 1 kHz
-// path: nothing is allocated, nothing locked.
+// The devices on the 1 kHz path, and what happens rarely there: nothing is allocated, nothing locked.
 #include <catch2/catch.hpp>
 
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/device/mouse/spidar_mouse.h"
 #include "haptic_server/device/spidar_kinematics.h"
 #include "haptic_server/device/tension.h"
@@ -55,6 +55,42 @@ TEST_CASE("four strings: a suspect and forces out of reach allocate nothing and 
   REQUIRE(test::Allocations() == allocations);
   REQUIRE(test::Locks() == locks);
   REQUIRE(sum > 0);
+}
+
+TEST_CASE(
+    "a grip, simulated and on the USB: reading, writing, a fault and letting go allocate nothing") {
+  Settings settings;
+  settings.spidar = G6X3Settings();
+  settings.hand.home_mm = Vec3(-10, 0, 0);
+  settings.hand.stroke_mm = Vec3(20, 5, 0);
+  settings.usb.channels = {0, 1, 2, 3, 4, 5, 6, 7};
+  settings.usb.count_directions = {1, 1, -1, -1, -1, -1, 1, 1};
+  settings.usb.board = UsbBoardModel::kSh4;
+  auto made = std::make_unique<test::CannedPort>(settings.usb.board);
+  test::CannedPort& port = *made;
+  const auto simulated = MakeDevice(settings);
+  const auto usb = MakeSpidar(
+      settings.spidar,
+      std::make_unique<UsbBoard>(settings.usb, settings.spidar.tension_min_n, std::move(made)));
+  std::mt19937_64 random(3);
+  const long allocations = test::Allocations();
+  const long locks = test::Locks();
+  int read = 0;
+  double sum = 0;
+  for (std::int64_t tick = 0; tick < 1000; ++tick) {
+    port.is_silent = tick % 100 > 60;
+    for (Device* const device : {simulated.get(), usb.get()}) {
+      DeviceSample sample;
+      read += device->Read(tick * 1'000'000, sample) == DeviceStatus::kOk ? 1 : 0;
+      sum += device->Write(RandomInBall(random, 0.1 * static_cast<double>(tick))).norm();
+      if (tick % 10 == 0) device->Release();
+    }
+  }
+  CHECK(test::Allocations() == allocations);
+  CHECK(test::Locks() == locks);
+  CHECK(read >= 1000 + 10 * 61);
+  CHECK(read < 2000);
+  CHECK(sum > 0);
 }
 
 TEST_CASE("boards on the USB: answered or not, the driver allocates nothing and locks nothing") {

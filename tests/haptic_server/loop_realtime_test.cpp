@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "common/clock.h"
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/loop.h"
 #include "tests/haptic_server/guard.h"
 

@@ -13,6 +13,7 @@ namespace {
 
 const std::string kShipped = RIKISEKI_SOURCE_DIR "/config/haptic_server.ini";
 const std::string kShippedDevice = RIKISEKI_SOURCE_DIR "/config/devices/simulated.ini";
+const std::string kShippedGrip = RIKISEKI_SOURCE_DIR "/config/devices/spidar_g6x3r_simple.ini";
 const std::string kShippedBoard = RIKISEKI_SOURCE_DIR "/config/devices/spidar4_simple.ini";
 
 // A folder of its own for each test, with the shipped files to damage.
@@ -86,6 +87,7 @@ TEST_CASE("the shipped files load and give every key, no more and no less") {
   std::set<std::string> shipped = KeysOf(kShipped);
   shipped.merge(KeysOf(kShippedDevice));
   shipped.merge(KeysOf(kShippedBoard));
+  shipped.merge(KeysOf(kShippedGrip));
   REQUIRE(shipped == known);
 
   // What the files say is what the code has as default.
@@ -253,6 +255,49 @@ TEST_CASE("refusals of the device file name that file") {
   SECTION("bounds the wrong way round") {
     REQUIRE(refused("tension_max_n", "tension_max_n = 0.4").find("spidar.tension_min_n") !=
             std::string::npos);
+  }
+}
+
+TEST_CASE("of eight strings every key counts too, and what cannot hold a grip is refused") {
+  const std::string file = "device.file=" + kShippedGrip;
+  const Settings settings = LoadSettings(kShipped, {file});
+  REQUIRE(settings.spidar.motors_m.size() == 8);
+  REQUIRE(settings.spidar.attachments_mm.size() == 8);
+  REQUIRE(settings.spidar.attachments_mm[2] == Vec3(0, -22.5, 0));
+  REQUIRE(settings.spidar.rest_tension_n == 1);
+  REQUIRE(LoadSettings(kShipped, {file, "spidar.rest_tension_n=2"}).spidar.rest_tension_n == 2);
+
+  const auto refused = [&](const std::string& change, const std::string& why) {
+    const std::string text = Refusal(kShipped, {file, change});
+    CAPTURE(change, text);
+    // Where the key stands that would have to change.
+    CHECK((text.starts_with("--set " + change) || text.starts_with(kShippedGrip + ":")));
+    CHECK(text.find(why) != std::string::npos);
+  };
+  refused("spidar.rest_tension_n=0.2", "between spidar.tension_min_n and spidar.tension_max_n");
+  refused("spidar.rest_tension_n=21", "between spidar.tension_min_n and spidar.tension_max_n");
+  refused("spidar.tension_max_n=0.2", "it must exceed spidar.tension_min_n");
+  refused("spidar.attachments_mm=0 0 1, 0 1 0", "8 places are expected, one for each motor");
+  refused("spidar.attachments_mm=0 0 0, 0 0 0, 0 0 0, 0 0 0, 0 0 0, 0 0 0, 0 0 0, 0 0 0",
+          "do not fix the grip in all six directions");
+  refused("spidar.motors_m=-1 1 1, 1 1 -1, -1 -1 -1, 1 -1 1", "leave it out, or give 8 motors");
+  refused("spidar.motors_m=-1 1 1, 1 1 -1, -1 -1 -1, 1 -1 1, 1 1 1", "exactly 4 motors, or 8");
+  // Strings that all turn the grip the same way about y: the table of the finger grip, as published
+  // (Springhead, SpidarG6X3F), does.
+  const std::string text =
+      Refusal(kShipped,
+              {file,
+               "spidar.motors_m=-0.06 -0.073 -0.06, 0.06 -0.073 -0.06, 0.06 -0.073 0.06, -0.06 "
+               "-0.073 0.06, -0.06 0.073 -0.06, 0.06 0.073 -0.06, 0.06 0.073 0.06, -0.06 0.073 "
+               "0.06",
+               "spidar.attachments_mm=-16 0 0, 0 0 -16, 16 0 0, 0 0 16, -16 0 0, 0 0 -16, 16 0 0, "
+               "0 0 16"});
+  CAPTURE(text);
+  CHECK(text.starts_with("--set spidar.attachments_mm"));
+  CHECK(text.find("cannot hold the grip still in the middle") != std::string::npos);
+
+  for (const char* of_a_grip : {"spidar.attachments_mm=0 0 1", "spidar.rest_tension_n=1"}) {
+    CHECK(Refusal(kShipped, {of_a_grip}).find("meet in one point") != std::string::npos);
   }
 }
 

@@ -180,5 +180,58 @@ TEST_CASE("a finger that the mapping throws out of the world feels nothing") {
   REQUIRE(bench.message.pointers[0].position[0] == -50);
 }
 
+// Upright but for a turn, under a torque that the device could not do without.
+class TurnedDevice final : public Device {
+ public:
+  DeviceStatus Read(std::int64_t, DeviceSample& sample) noexcept override {
+    sample = next;
+    return DeviceStatus::kOk;
+  }
+  Vec3 Write(const Vec3&) noexcept override { return Vec3::Zero(); }
+  Vec3 torque() const noexcept override { return Vec3(0.01, -0.02, 0.03); }
+  void Release() noexcept override {}
+  std::string Name() const override { return "turned"; }
+
+  DeviceSample next;
+};
+
+TEST_CASE("how the grip is turned, how fast, and the torque on it are published in the world") {
+  const Settings settings = Mapped(5, 0.2);
+  const Mapping mapping(settings.mapping);
+  TurnedDevice device;
+  const Vec3 axis(0.6, 0, -0.8);
+  device.next.orientation = Quat(Eigen::AngleAxisd(0.7, axis));
+  device.next.angular_velocity = 3 * axis;
+  HapticStep step(settings, device, kOwnEpoch);
+  protocol::HapticTick message;
+  step.Tick({.start_ns = 1'000'000, .previous_duration_ns = 0, .missed = 0}, WorldInput{}, message,
+            {});
+  const protocol::Pointer& pointer = message.pointers[0];
+  // The axis as the mapping lays directions into the world.
+  const Vec3 axis_W = mapping.VelocityInWorld(axis) / 5;
+  REQUIRE(ToQuat(pointer.orientation).angularDistance(Quat(Eigen::AngleAxisd(0.7, axis_W))) <
+          1e-12);
+  REQUIRE((ToVec3(pointer.angular_velocity) - 3 * axis_W).norm() < 1e-12);
+  // A turn is the same in both, and so is torque times turn per force times way: s_x/s_f times the
+  // torque.
+  const Vec3 torque_W = mapping.VelocityInWorld(device.torque()) / 5 * (5 / 0.2);
+  REQUIRE((ToVec3(pointer.torque) - torque_W).norm() < 1e-12);
+
+  device.next.orientation.w() = std::nan("");
+  step.Tick({.start_ns = 2'000'000, .previous_duration_ns = 1'000'000, .missed = 0}, WorldInput{},
+            message, {});
+  REQUIRE(message.pointers[0].reason == ForceReason::kNotFinite);
+  REQUIRE(ToQuat(message.pointers[0].orientation).coeffs().allFinite());
+}
+
+TEST_CASE("a device that measures no orientation publishes none, however it lies in the world") {
+  Bench bench(Mapped(5, 0.2));
+  bench.Run(3);
+  const protocol::Pointer still;
+  REQUIRE(bench.message.pointers[0].orientation == still.orientation);
+  REQUIRE(bench.message.pointers[0].angular_velocity == still.angular_velocity);
+  REQUIRE(bench.message.pointers[0].torque == still.torque);
+}
+
 }  // namespace
 }  // namespace rikiseki::haptic

@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <mutex>
 
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/step.h"
 #include "tests/haptic_server/guard.h"
 

@@ -1,4 +1,6 @@
 // The emergency stop, within the step and down to the strings.
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <memory>
 
@@ -103,17 +105,17 @@ TEST_CASE("an emergency stop leaves every string of a SPIDAR at its minimum tens
           message);
     }
   };
-  const FourStrings loose = {0.5, 0.5, 0.5, 0.5};
+  const std::array<double, 4> loose = {0.5, 0.5, 0.5, 0.5};
   run(500);
   REQUIRE(ToVec3(message.pointers[0].force).norm() > 0.5);
-  REQUIRE(board.tension() != loose);
+  REQUIRE_FALSE(std::ranges::equal(board.tension(), loose));
   board.SetEnabled(false);
   run(1);
   REQUIRE(message.pointers[0].reason == ForceReason::kEmergencyStop);
-  REQUIRE(board.tension() == loose);
+  REQUIRE(std::ranges::equal(board.tension(), loose));
   board.SetEnabled(true);
   run(100);
-  REQUIRE(board.tension() == loose);
+  REQUIRE(std::ranges::equal(board.tension(), loose));
 }
 
 }  // namespace

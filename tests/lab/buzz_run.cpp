@@ -6,7 +6,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
 #include "tests/lab/coupled_run.h"
 #include "world_server/physics/bullet_world.h"
 

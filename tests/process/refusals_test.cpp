@@ -55,6 +55,15 @@ TEST_CASE("an unknown key") {
                {file.path() + ":3", "render.stifness_n_per_m", "2000", "render.stiffness_n_per_m"});
 }
 
+TEST_CASE("a guided procedure on a device of eight strings") {
+  for (const char* procedure : {"--calibrate", "--identify", "--z-width"}) {
+    CheckOneLine(
+        Run({Program("haptic_server"), "--config", SourceFile("config/haptic_server.ini"), "--set",
+             "device.file=" + SourceFile("config/devices/spidar_g6x3r_simple.ini"), procedure}),
+        {"spidar_g6x3r_simple.ini", "devices of 4 strings only, and this one has 8"});
+  }
+}
+
 TEST_CASE("a wrong value") {
   const TemporaryFile file("bad.ini", "[render]\nstiffness_n_per_m = stiff\n");
   CheckOneLine(RunHaptic(file),

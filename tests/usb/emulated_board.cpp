@@ -9,8 +9,7 @@ namespace rikiseki::test {
 namespace {
 
 using haptic::EncoderCounts;
-using haptic::FourStrings;
-using haptic::kTensionStrings;
+using haptic::PerString;
 using haptic::UsbBoardModel;
 
 std::uint16_t Word(std::span<const std::uint8_t> bytes, std::size_t at) {
@@ -40,8 +39,7 @@ EmulatedBoard::EmulatedBoard(const haptic::Settings& settings, int switch_id, Be
       begins_(begins),
       program_(begins == Begins::kByItself ? ScriptOf(settings.hand) : Waiting(settings)),
       board_(settings.spidar,
-             {[this](double t_s) { return HandTarget(t_s); }, ImpedanceOf(settings)}),
-      kinematics_(settings.spidar.motors_m) {}
+             {[this](double t_s) { return HandTarget(t_s); }, ImpedanceOf(settings)}) {}
 
 Vec3 EmulatedBoard::HandTarget(double t_s) {
   if (is_requested_) {
@@ -155,16 +153,11 @@ void EmulatedBoard::Advance(std::int64_t now_ns) {
   if (now_ns < carried_until_ns_) {
     const double way = static_cast<double>(now_ns - held_until_ns_) /
                        static_cast<double>(carried_until_ns_ - held_until_ns_);
-    const Vec3 position = haptic::MinimumJerk(way) * settings_.hand.home_mm * 1e-3;
-    const auto lengths = kinematics_.Lengths(position);
-    const auto home = kinematics_.Lengths(Vec3::Zero());
-    for (std::size_t string = 0; string < kTensionStrings; ++string) {
-      counts[string] =
-          std::llround((lengths[string] - home[string]) / settings_.spidar.count_length_m);
-    }
+    counts = board_.CountsAt(
+        {haptic::MinimumJerk(way) * settings_.hand.home_mm * 1e-3, Quat::Identity()});
   } else {
-    FourStrings tension{};
-    for (std::size_t string = 0; string < kTensionStrings; ++string) {
+    PerString tension{};
+    for (std::size_t string = 0; string < settings_.usb.channels.size(); ++string) {
       const auto channel = static_cast<std::size_t>(settings_.usb.channels[string]);
       tension[string] = digits_[channel] / OfString(settings_.usb.digit_per_volt, string) /
                         OfString(settings_.usb.volt_per_newton, string);
@@ -173,7 +166,7 @@ void EmulatedBoard::Advance(std::int64_t now_ns) {
     board_.ReadCounts(now_ns, counts);
   }
   const int wiring = settings_.usb.board == UsbBoardModel::kSh4 ? -1 : 1;
-  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+  for (std::size_t string = 0; string < settings_.usb.channels.size(); ++string) {
     const auto channel = static_cast<std::size_t>(settings_.usb.channels[string]);
     const int flip = settings_.usb.count_directions[string] < 0 ? -1 : 1;
     counters_[channel] = wiring * flip * counts[string];

@@ -84,7 +84,6 @@ class EmulatedBoard final : public EmulatedFirmware {
   double begun_s_ = 0;
   bool is_requested_ = false;
   haptic::SimulatedBoard board_;
-  haptic::SpidarKinematics kinematics_;
   std::int64_t held_until_ns_ = 0;
   std::int64_t carried_until_ns_ = 0;
   std::array<std::uint16_t, 8> digits_{};

@@ -91,7 +91,7 @@ int Cycles() {
 }  // namespace
 
 TEST_CASE("unplugged and plugged in again, over and over, with counters kept or lost") {
-  const char* file = GENERATE("spidar4_simple.ini", "spidar4_sh4.ini");
+  const char* file = GENERATE("spidar4_simple.ini", "spidar4_sh4.ini", "spidar_g6x3r_sh4.ini");
   EmulatedBus bus(file, {"--set", "hand.script=rest"});
   bus.Tell("plug");
   // The hand rests, 50 mm from the middle: a board that forgot its counters under a hand that moves before it is

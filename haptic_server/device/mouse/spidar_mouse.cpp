@@ -59,6 +59,7 @@ DeviceStatus SpidarMouse::Read(std::int64_t now_ns, DeviceSample& sample) noexce
     }
   }
   const std::optional<MouseWay> way = mouse_.Read();
+  const Vec3 before = position_;
   if (way) Follow(*way);
   if (!held_ || !way) {
     velocity_.Restart();
@@ -66,7 +67,7 @@ DeviceStatus SpidarMouse::Read(std::int64_t now_ns, DeviceSample& sample) noexce
   }
   sample.enabled = true;
   sample.position = position_;
-  sample.velocity = velocity_.Update(now_ns, position_, velocity_cutoff_hz_);
+  sample.velocity = velocity_.Update(now_ns, position_ - before, velocity_cutoff_hz_);
   sample.target = position_;
   return DeviceStatus::kOk;
 }

@@ -12,7 +12,7 @@
 #include "haptic_server/device/mouse/mouse_packets.h"
 #include "haptic_server/device/mouse/mouse_settings.h"
 #include "haptic_server/device/usb/usb_port.h"
-#include "haptic_server/device/velocity_filter.h"
+#include "haptic_server/device/velocity_estimate.h"
 
 namespace rikiseki::haptic {
 
@@ -59,7 +59,7 @@ class SpidarMouse final : public Device {
   bool followed_ = false;  // the mouse was read before
   MouseWay way_;
   Vec3 position_ = Vec3::Zero();
-  VelocityFilter velocity_;
+  VelocityEstimate velocity_;
 };
 
 }  // namespace rikiseki::haptic

@@ -9,12 +9,14 @@ namespace rikiseki::haptic {
 
 class StringChannels {
  public:
-  /// Settings in which FindUsbConflict finds nothing for four strings.
+  /// Settings in which FindUsbConflict finds nothing; as many strings as usb.channels.
   explicit StringChannels(const UsbSettings& usb);
 
   /// The digits of tensions [N]: digit = tension x V/N x digit/V, to the nearest. What is not a positive
   /// number is 0, as are channels without a string. // RT:
-  DaDigits Digits(const FourStrings& tension) const noexcept;
+  DaDigits Digits(const PerString& tension) const noexcept;
+
+  std::size_t string_count() const noexcept { return string_count_; }
 
   /// The board's counter of a string. // RT:
   std::int32_t Raw(const RawCounts& counts, std::size_t string) const noexcept {
@@ -26,9 +28,10 @@ class StringChannels {
   int direction(std::size_t string) const noexcept { return direction_[string]; }
 
  private:
-  std::array<std::size_t, kTensionStrings> channel_{};
-  std::array<int, kTensionStrings> direction_{};
-  FourStrings digit_per_newton_{};
+  std::size_t string_count_;
+  std::array<std::size_t, kMaxStrings> channel_{};
+  std::array<int, kMaxStrings> direction_{};
+  PerString digit_per_newton_{};
 };
 
 }  // namespace rikiseki::haptic

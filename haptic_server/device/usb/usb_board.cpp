@@ -11,8 +11,8 @@
 namespace rikiseki::haptic {
 namespace {
 
-FourStrings AllAt(double tension_n) {
-  FourStrings tension;
+PerString AllAt(double tension_n) {
+  PerString tension;
   tension.fill(tension_n);
   return tension;
 }
@@ -49,7 +49,7 @@ bool UsbBoard::ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept {
     return false;
   }
   if (is_new_ || missed_ > kHeldReadings) return false;
-  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+  for (std::size_t string = 0; string < channels_.string_count(); ++string) {
     counts[string] = channels_.direction(string) * (counter_[string] - home_[string]);
   }
   return true;
@@ -95,14 +95,14 @@ UsbTrouble UsbBoard::Decode(std::span<const std::uint8_t> bytes, RawCounts& raw)
 void UsbBoard::Follow(const RawCounts& raw) noexcept {
   std::int64_t moved_if_kept = 0;
   std::int64_t moved_if_anew = 0;
-  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+  for (std::size_t string = 0; string < channels_.string_count(); ++string) {
     const std::int32_t now = channels_.Raw(raw, string);
     const std::int64_t kept = ExtendCount(counter_[string], now, count_bits_);
     moved_if_kept = std::max(moved_if_kept, std::abs(kept - counter_[string]));
     moved_if_anew = std::max(moved_if_anew, std::abs(ExtendCount(0, now, count_bits_)));
   }
   const bool began_anew = ever_read_ && is_new_ && moved_if_anew < moved_if_kept;
-  for (std::size_t string = 0; string < kTensionStrings; ++string) {
+  for (std::size_t string = 0; string < channels_.string_count(); ++string) {
     if (began_anew) {
       home_[string] -= counter_[string];
       counter_[string] = 0;
@@ -132,7 +132,7 @@ bool UsbBoard::SendDigits() noexcept {
   return sent;
 }
 
-bool UsbBoard::WriteTensions(const FourStrings& tension) noexcept {
+bool UsbBoard::WriteTensions(const PerString& tension) noexcept {
   if (!held_) return false;
   digits_ = channels_.Digits(tension);
   return SendDigits();

@@ -25,7 +25,7 @@ class UsbBoard final : public MotorBoard {
   UsbBoard(const UsbSettings& usb, double rest_tension_n, std::unique_ptr<UsbPort> port);
 
   bool ReadCounts(std::int64_t now_ns, EncoderCounts& counts) noexcept override;
-  bool WriteTensions(const FourStrings& tension) noexcept override;
+  bool WriteTensions(const PerString& tension) noexcept override;
   bool Enabled() const noexcept override { return enabled_; }
   const Hand* hand() const noexcept override { return nullptr; }
   std::string Name() const override { return port_->Name(); }
@@ -57,8 +57,8 @@ class UsbBoard final : public MotorBoard {
   UsbTrouble doubt_ = UsbTrouble::kNone;  // of the newest reading
   DaDigits digits_;                       // commanded
   // Of each string: the counter, extended, and what it read with the grip in the middle.
-  std::array<std::int64_t, kTensionStrings> counter_{};
-  std::array<std::int64_t, kTensionStrings> home_{};
+  std::array<std::int64_t, kMaxStrings> counter_{};
+  std::array<std::int64_t, kMaxStrings> home_{};
 };
 
 }  // namespace rikiseki::haptic

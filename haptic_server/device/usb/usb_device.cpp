@@ -1,8 +1,8 @@
 #include "haptic_server/device/usb/usb_device.h"
 
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/device/mouse/event_mouse.h"
 #include "haptic_server/device/mouse/spidar_mouse.h"
-#include "haptic_server/device/spidar.h"
 #include "haptic_server/device/usb/libusb_port.h"
 #include "haptic_server/device/usb/usb_board.h"
 #include "haptic_server/device/usb/usb_error.h"
@@ -24,7 +24,7 @@ std::unique_ptr<Device> OpenDevice(const Settings& settings) {
                                          std::make_unique<LibusbPort>(BoardOf(settings.mouse), 0));
   }
   if (settings.device.kind != DeviceKind::kUsb) return MakeDevice(settings);
-  return std::make_unique<Spidar>(settings.spidar, OpenUsbBoard(settings));
+  return MakeSpidar(settings.spidar, OpenUsbBoard(settings));
 }
 
 std::unique_ptr<MotorBoard> OpenUsbBoard(const Settings& settings) {

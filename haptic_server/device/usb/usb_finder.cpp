@@ -310,7 +310,7 @@ OpenBoard FindBoard(const UsbSettings& usb) {
 
 void SetUpBoard(OpenBoard& board, const UsbSettings& usb, double rest_tension_n, bool first) {
   if (usb.board == UsbBoardModel::kMouse) return;  // has no counters, and shows nothing until told
-  FourStrings rest;
+  PerString rest;
   rest.fill(rest_tension_n);
   const DaDigits digits = StringChannels(usb).Digits(rest);
   const auto pull = [&] {

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "haptic_server/device/spidar_pose.h"
+#include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
 
@@ -25,6 +26,20 @@ inline std::array<Vec3, kGripStrings> G6X3Attachments() {
 
 inline constexpr double kG6X3CountLength = 1.66555e-5;  // m
 inline constexpr TensionBounds kG6X3Bounds{0.3, 20};
+
+/// As a device file says it, with 1 N on every string at rest.
+inline SpidarSettings G6X3Settings() {
+  SpidarSettings spidar;
+  for (std::size_t string = 0; string < kGripStrings; ++string) {
+    spidar.motors_m.push_back(G6X3Motors()[string]);
+    spidar.attachments_mm.push_back(1e3 * G6X3Attachments()[string]);
+  }
+  spidar.count_length_m = kG6X3CountLength;
+  spidar.tension_min_n = kG6X3Bounds.min_n;
+  spidar.tension_max_n = kG6X3Bounds.max_n;
+  spidar.rest_tension_n = 1;
+  return spidar;
+}
 
 inline Vec3 RandomInBall(std::mt19937_64& random, double radius) {
   std::uniform_real_distribution<double> uniform(-radius, radius);

@@ -2,9 +2,12 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <span>
 
 #include "haptic_server/device/hand.h"
+#include "haptic_server/device/make_device.h"
 #include "haptic_server/device/simulated_board.h"
+#include "tests/haptic_server/device/scripted_board.h"
 
 namespace rikiseki::haptic {
 namespace {
@@ -16,33 +19,12 @@ SpidarSettings Cube() {
   return spidar;
 }
 
-// A board whose grip the test holds.
-class ScriptedBoard final : public MotorBoard {
- public:
-  bool ReadCounts(std::int64_t, EncoderCounts& out) noexcept override {
-    out = counts;
-    return answers;
-  }
-  bool WriteTensions(const FourStrings& out) noexcept override {
-    tension = out;
-    return answers;
-  }
-  bool Enabled() const noexcept override { return enabled; }
-  const Hand* hand() const noexcept override { return nullptr; }
-  std::string Name() const override { return "scripted"; }
-
-  EncoderCounts counts{};
-  FourStrings tension{};
-  bool answers = true;
-  bool enabled = true;
-};
-
 EncoderCounts CountsAt(const Vec3& position) {
   const SpidarKinematics kinematics(Cube().motors_m);
   const PerString home = kinematics.Lengths(Vec3::Zero());
   const PerString lengths = kinematics.Lengths(position);
-  EncoderCounts counts;
-  for (std::size_t i = 0; i < counts.size(); ++i) {
+  EncoderCounts counts{};
+  for (std::size_t i = 0; i < kTensionStrings; ++i) {
     counts[i] = std::llround((lengths[i] - home[i]) / Cube().count_length_m);
   }
   return counts;
@@ -157,9 +139,10 @@ TEST_CASE("Write tells what the strings really display, Release lets go") {
   spidar.Read(0, sample);
   REQUIRE((spidar.Write(Vec3(3, 1, -2)) - Vec3(3, 1, -2)).norm() < 1e-11);
   REQUIRE(spidar.Write(Vec3(500, 0, 0)).norm() < 60);  // at most what the strings hold
-  for (const double t : board.tension) REQUIRE((t >= 0.5 && t <= 20));
+  const std::span<const double> pulled(board.tension.data(), kTensionStrings);
+  for (const double t : pulled) REQUIRE((t >= 0.5 && t <= 20));
   spidar.Release();
-  for (const double t : board.tension) REQUIRE(t == 0.5);
+  for (const double t : pulled) REQUIRE(t == 0.5);
 }
 
 TEST_CASE("the simulated grip moves as hand and device under the string force") {

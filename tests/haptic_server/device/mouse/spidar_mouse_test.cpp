@@ -112,7 +112,7 @@ TEST_CASE("the position follows the mouse, stays within the space, and is flat")
   CHECK((rig.sample.position - Vec3(0.04, 0.02, 0)).norm() < 1e-15);
 }
 
-TEST_CASE("let go, the board is stopped; the next force starts it again") {
+TEST_CASE("let go, the board is stopped, and the next force starts it again") {
   Rig rig;
   REQUIRE(rig.Read() == DeviceStatus::kOk);
   CHECK(rig.device.Write(Vec3(1, 0, 0)).x() > 0.99);

@@ -6,7 +6,8 @@
 #include <cmath>
 #include <utility>
 
-#include "haptic_server/device/spidar.h"
+#include "haptic_server/device/make_device.h"
+#include "haptic_server/device/simulated_board.h"
 #include "haptic_server/device/usb/simple_packets.h"
 #include "tests/usb/emulated_board.h"
 #include "tests/usb/emulated_port.h"
@@ -37,7 +38,7 @@ struct Rig {
         std::make_unique<UsbBoard>(settings.usb, settings.spidar.tension_min_n, std::move(made));
   }
 
-  bool Tick(const FourStrings& tension) {
+  bool Tick(const PerString& tension) {
     port->now_ns += kTickNs;
     const bool read = board->ReadCounts(port->now_ns, counts);
     board->WriteTensions(tension);
@@ -61,7 +62,7 @@ class Recorded final : public MotorBoard {
     *counts_ = counts;
     return read;
   }
-  bool WriteTensions(const FourStrings& tension) noexcept override {
+  bool WriteTensions(const PerString& tension) noexcept override {
     return board_->WriteTensions(tension);
   }
   bool Enabled() const noexcept override { return board_->Enabled(); }
@@ -83,29 +84,31 @@ Vec3 WallForce(const Vec3& position) {
 TEST_CASE("the same hand gives the same trace as through the simulated device, within one count") {
   const std::string file =
       GENERATE("spidar4_simple.ini", "spidar4_sh4.ini", "spidar_big4_simple.ini",
-               "spidar_big4_sh4.ini", "spidar_g6x3_4_simple.ini", "spidar_g6x3_4_sh4.ini");
+               "spidar_big4_sh4.ini", "spidar_g6x3_4_simple.ini", "spidar_g6x3_4_sh4.ini",
+               "spidar_g6x3r_simple.ini", "spidar_g6x3r_sh4.ini", "spidar_g6x3l_sh4.ini");
   CAPTURE(file);
   const Settings settings = Load(file);
   EncoderCounts simulated_counts{};
   EncoderCounts usb_counts{};
-  Spidar simulated(settings.spidar,
-                   std::make_unique<Recorded>(
-                       std::make_unique<SimulatedBoard>(settings.spidar, MakeHand(settings)),
-                       &simulated_counts));
+  const auto simulated = MakeSpidar(
+      settings.spidar, std::make_unique<Recorded>(
+                           std::make_unique<SimulatedBoard>(settings.spidar, MakeHand(settings)),
+                           &simulated_counts));
   Rig rig(settings);
   test::EmulatedPort& port = *rig.port;
-  Spidar usb(settings.spidar, std::make_unique<Recorded>(std::move(rig.board), &usb_counts));
+  const auto usb =
+      MakeSpidar(settings.spidar, std::make_unique<Recorded>(std::move(rig.board), &usb_counts));
   std::int64_t largest_count = 0;
   double largest_force = 0;
   for (int tick = 0; tick < 3000; ++tick) {
     port.now_ns = tick * kTickNs;
     DeviceSample sample;
-    REQUIRE(simulated.Read(port.now_ns, sample) == DeviceStatus::kOk);
-    largest_force = std::max(largest_force, simulated.Write(WallForce(sample.position)).norm());
-    REQUIRE(usb.Read(port.now_ns, sample) == DeviceStatus::kOk);
-    usb.Write(WallForce(sample.position));
+    REQUIRE(simulated->Read(port.now_ns, sample) == DeviceStatus::kOk);
+    largest_force = std::max(largest_force, simulated->Write(WallForce(sample.position)).norm());
+    REQUIRE(usb->Read(port.now_ns, sample) == DeviceStatus::kOk);
+    usb->Write(WallForce(sample.position));
     port.NextTick();
-    for (std::size_t string = 0; string < kTensionStrings; ++string) {
+    for (std::size_t string = 0; string < settings.spidar.motors_m.size(); ++string) {
       REQUIRE(std::abs(usb_counts[string] - simulated_counts[string]) <= 1);
       largest_count = std::max(largest_count, std::abs(usb_counts[string]));
     }

@@ -43,7 +43,7 @@ TEST_CASE("every shipped device file with a board can be run, and gives every ke
     }
     ++boards;
   }
-  CHECK(boards == 6);
+  CHECK(boards == 12);
 }
 
 TEST_CASE("a device file without a board is refused with the cure") {
@@ -52,7 +52,7 @@ TEST_CASE("a device file without a board is refused with the cure") {
   CHECK(text.find("devices/spidar4_simple.ini") != std::string::npos);
 }
 
-TEST_CASE("what cannot drive four strings is refused, with place, key, value and what is right") {
+TEST_CASE("what cannot drive the strings is refused, with place, key, value and what is right") {
   const auto refused = [](const std::string& change, const std::string& why,
                           const std::string& file = "spidar4_simple.ini") {
     const std::string text = Refusal(UsbFile(file, change));
@@ -77,6 +77,11 @@ TEST_CASE("what cannot drive four strings is refused, with place, key, value and
   refused("usb.switch_id=16", "from -1 to 15");
   refused("usb.board=h8", "none | simple | sh4");
   refused("usb.phase_mask=256", "from 0 to 255");
+  refused("usb.channels=0 1 2 3", "8 numbers, one for each string", "spidar_g6x3r_sh4.ini");
+  refused("usb.channels=0 1 2 3 4 5 6 6", "two strings cannot be on one channel",
+          "spidar_g6x2_simple.ini");
+  refused("usb.digit_per_volt=415 415 415 415", "one number, or 8 numbers",
+          "spidar_g6x3l_simple.ini");
   CHECK(Refusal(UsbFile("spidar4_sh4.ini", "usb.enable_bit=8")) == "accepted");
   CHECK(Refusal(UsbFile("spidar4_simple.ini", "usb.digit_per_volt=418 414.3 414.5 415.8")) ==
         "accepted");
@@ -84,6 +89,7 @@ TEST_CASE("what cannot drive four strings is refused, with place, key, value and
 
 TEST_CASE("a device file with a board serves the simulated device as well") {
   CHECK(Refusal({"device.file=" + kFolder + "spidar_big4_sh4.ini"}) == "accepted");
+  CHECK(Refusal({"device.file=" + kFolder + "spidar_g6x3r_sh4.ini"}) == "accepted");
 }
 
 }  // namespace
