@@ -139,7 +139,7 @@ class LabPc:
                  "systemd.mask=systemd-firstboot.service"],
                 stdin=subprocess.DEVNULL, stdout=console, stderr=console, start_new_session=True)
         try:
-            self.leader = wait_until("systemd starts", self._find_leader, 30)
+            self.leader = wait_until("systemd starts", self._find_leader, 120)
             wait_until("systemd is up", lambda: self.state() in ("running", "degraded"))
         except AssertionError:
             skip(f"this machine boots no systemd: {self.console.read_text(errors='replace')[-2000:]}")

@@ -380,11 +380,10 @@ TEST_CASE(
   step.BeginHapticEpoch(1);
   HapticTick message = At(0, {-0.045, 0, 0});
   Push(message, 0, Vec3::Zero(), Vec3::Zero());
-  message.previous_duration_ns = 1'000'000;
+  message.period_ns = message.previous_duration_ns = 1'000'000;
   step.Consume(message);
   WorldFrame frame;
-  step.Tick(kPeriod,
-            frame);  // of a body without a copy a push would be held against the finger's work
+  step.Tick(kPeriod, frame);  // the finger has a copy of the cube from now on
   Vec3 impulse = Vec3::Zero();
   Vec3 way = Vec3::Zero();
   for (std::uint64_t k = 1; k <= 500; ++k) {

@@ -14,17 +14,20 @@ double Power(const Kick& kick, const BodyState& state) {
 
 }  // namespace
 
-void PushBudget::Grant(double work_j, double spring_j, const BodyState& state) {
+void PushBudget::Grant(const Means& means, const BodyState& state) {
   Settle(state);
-  left_j_ = std::min(left_j_, spring_j) + work_j;
+  if (left_j_ < 0) left_j_ *= means.debt_kept;
+  left_j_ = std::min(left_j_, means.spring_j) + means.work_j;
+  overdraft_j_ = means.overdraft_j;
   if (!std::isfinite(left_j_)) left_j_ = 0;
   refused_.setZero();
 }
 
-// Of a free body the speed along the kick grows by twice what was charged, of one that is held by nothing.
+// The force was held from kick to kick: its work is half of what its power was at both ends. Of a free body
+// that is what was charged, of one that is held nothing, of one that is driven back less.
 void PushBudget::Settle(const BodyState& state) {
   const double grown = Power(newest_, state) - Power(newest_, before_);
-  if (std::isfinite(grown)) left_j_ += charged_j_ - std::clamp(grown / 2, 0.0, charged_j_);
+  if (std::isfinite(grown)) left_j_ += charged_j_ - std::clamp(grown / 2, -charged_j_, charged_j_);
   charged_j_ = 0;
 }
 
@@ -39,8 +42,9 @@ void PushBudget::Limit(const BodyInertia& inertia, const BodyState& state, Kick&
   double share = 0;
   if (std::isfinite(power) && std::isfinite(own)) {
     share = 1;
-    if (power + own > left_j_) {
-      const double discriminant = power * power + 4 * own * left_j_;
+    const double budget = left_j_ + (overdraft_j_ > 0 ? overdraft_j_ + own : 0);
+    if (power + own > budget) {
+      const double discriminant = power * power + 4 * own * budget;
       const double top = -power + (discriminant > 0 ? std::sqrt(discriminant) : 0);
       share = own > 0 ? std::clamp(top / (2 * own), 0.0, 1.0) : 0;
     }

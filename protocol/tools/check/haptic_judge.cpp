@@ -307,6 +307,9 @@ void HapticJudge::Channels(const HapticTick& tick, bool consecutive) {
   if (planes.size() != 1 || shown->second.unchanged < 2 || tick.pointer_count == 0) return;
   if (planes[0].inverse_mass == 0) return;  // ground's
   if (Norm(TotalForce(tick)) < 0.01) return;
+  // The world that we play was held up for so long that it counts as lost: what brakes the finger then is no
+  // contact, and ground's.
+  if (tick.pointers[0].reason == ForceReason::kWorldLost) return;
   // One that vanished while it was pressed may fade (6.2, recovery): its own channel grows by that.
   const auto fits = [&](const Channel& channel) {
     const bool is_shown = channel.body == planes[0].body &&

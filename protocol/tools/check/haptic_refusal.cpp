@@ -35,7 +35,7 @@ void RefusesThree(WorldPlayer& player, const std::function<void(WorldFrame&)>& a
                 ": the previous frame is to be kept");
   }
   Require(goes_on, "good frames after three spoilt ones are not displayed");
-  if (!player.Until([&] { return player.peer().Counters().rejected > rejected; }, 0.5)) {
+  if (!player.Until([&] { return player.peer().Counters().rejected > rejected; }, 2)) {
     Fail("the header's `rejected` does not count them");
   }
 }

@@ -32,7 +32,7 @@ TEST_CASE("from rest a free body gets the finger's work, and no more") {
   for (const double work_j : {0.0, 1e-6, 1e-3, 0.05, 10.0}) {
     BodyState state;
     PushBudget budget;
-    budget.Grant(work_j, 0, state);
+    budget.Grant({.work_j = work_j, .spring_j = 0}, state);
     for (int k = 0; k < 50; ++k) Push(budget, inertia, {.impulse = Vec3(4e-3, 0, 0)}, state);
     const double all = 50 * 4e-3;
     const double free_j = all * all / (2 * kMass);  // 1 J
@@ -48,7 +48,7 @@ TEST_CASE("pushed from rest by a finger that goes on, a body flies no faster tha
   constexpr double kSpeed = 0.2;
   BodyState state;
   PushBudget budget;
-  budget.Grant(10.0 * 0.05 * kSpeed, 0, state);  // 10 N for 50 ms
+  budget.Grant({.work_j = 10.0 * 0.05 * kSpeed, .spring_j = 0}, state);  // 10 N for 50 ms
   for (int k = 0; k < 50; ++k) Push(budget, inertia, {.impulse = Vec3(10 * kTick, 0, 0)}, state);
   CHECK(Kinetic(inertia, state) <= 10.0 * 0.05 * kSpeed * (1 + 1e-12));
   const double taken = kMass * state.velocity.x();
@@ -60,8 +60,8 @@ TEST_CASE("a body that something holds takes all of the push, at no cost") {
   const BodyInertia inertia = Cube();
   BodyState held;
   PushBudget budget;
-  budget.Grant(0, 4.0 * 4.0 / (2 * 2000), held);
-  budget.Grant(4e-3, 4.0 * 4.0 / (2 * 2000), held);  // the finger came in
+  budget.Grant({.work_j = 0, .spring_j = 4.0 * 4.0 / (2 * 2000)}, held);
+  budget.Grant({.work_j = 4e-3, .spring_j = 4.0 * 4.0 / (2 * 2000)}, held);  // the finger came in
   for (int period = 0; period < 100; ++period) {
     for (int k = 0; k < 50; ++k) {
       Kick kick{.impulse = Vec3(0, 0, -4 * kTick)};
@@ -69,7 +69,7 @@ TEST_CASE("a body that something holds takes all of the push, at no cost") {
       REQUIRE(kick.impulse.z() == -4 * kTick);
     }
     REQUIRE(budget.refused().isZero(0));
-    budget.Grant(0, 4.0 * 4.0 / (2 * 2000), held);
+    budget.Grant({.work_j = 0, .spring_j = 4.0 * 4.0 / (2 * 2000)}, held);
   }
 }
 
@@ -78,14 +78,14 @@ TEST_CASE("what comes towards the finger is stopped, and pays for being sent bac
   BodyState state;
   state.velocity = Vec3(-1, 0, 0);
   PushBudget budget;
-  budget.Grant(0, 0, state);
+  budget.Grant({.work_j = 0, .spring_j = 0}, state);
   for (int k = 0; k < 50; ++k) Push(budget, inertia, {.impulse = Vec3(2e-3, 0, 0)}, state);
   CHECK(state.velocity.x() == Approx(1).epsilon(1e-9));  // elastically
 
   // Of a body that paid the finger's work already, nothing is left to go back with.
   state.velocity = Vec3(-1, 0, 0);
   PushBudget drained;
-  drained.Grant(-kMass / 2, 0, state);
+  drained.Grant({.work_j = -kMass / 2, .spring_j = 0}, state);
   for (int k = 0; k < 50; ++k) Push(drained, inertia, {.impulse = Vec3(2e-3, 0, 0)}, state);
   CHECK(std::abs(state.velocity.x()) < 0.05);  // a tick's kick is 0.1 m/s
 }
@@ -94,15 +94,15 @@ TEST_CASE("what is left is kept as far as the spring holds it, what lacks is kep
   const BodyInertia inertia = Cube();
   BodyState state;
   PushBudget rich;
-  rich.Grant(100, 0, state);
-  rich.Grant(0, 1e-3, state);
+  rich.Grant({.work_j = 100, .spring_j = 0}, state);
+  rich.Grant({.work_j = 0, .spring_j = 1e-3}, state);
   Push(rich, inertia, {.impulse = Vec3(1, 0, 0)}, state);
   CHECK(Kinetic(inertia, state) == Approx(1e-3));
 
   state = {};
   PushBudget poor;
-  poor.Grant(-5e-3, 1, state);
-  poor.Grant(6e-3, 1, state);
+  poor.Grant({.work_j = -5e-3, .spring_j = 1}, state);
+  poor.Grant({.work_j = 6e-3, .spring_j = 1}, state);
   Push(poor, inertia, {.impulse = Vec3(1, 0, 0)}, state);
   CHECK(Kinetic(inertia, state) == Approx(1e-3));
 }
@@ -118,7 +118,7 @@ TEST_CASE("whatever comes, a free body never has more than was granted") {
     for (int period = 0; period < 20; ++period) {
       const double work_j = 1e-3 * any(random);
       granted += work_j;
-      budget.Grant(work_j, 1e9, state);
+      budget.Grant({.work_j = work_j, .spring_j = 1e9}, state);
       const double before = Kinetic(inertia, state);
       for (int k = 0; k < 10; ++k) {
         Push(budget, inertia,
@@ -131,16 +131,36 @@ TEST_CASE("whatever comes, a free body never has more than was granted") {
   }
 }
 
+TEST_CASE("with an overdraft a kick is charged afterwards, and lacking has an end") {
+  const BodyInertia inertia = Cube();
+  constexpr double kOverdraft = 0.05;
+  BodyState held;
+  PushBudget budget;
+  budget.Grant({.overdraft_j = kOverdraft}, held);
+  for (int k = 0; k < 100; ++k) {
+    Kick kick{.impulse = Vec3(0, 0, -0.1)};  // 0.25 J of a free body, each
+    budget.Limit(inertia, held, kick);
+    REQUIRE(kick.impulse.z() == -0.1);
+  }
+  BodyState free;
+  PushBudget other;
+  other.Grant({.overdraft_j = kOverdraft}, free);
+  for (int k = 0; k < 1000; ++k) Push(other, inertia, {.impulse = Vec3(1e-3, 0, 0)}, free);
+  const double kick_j = 1e-3 * free.velocity.x() + 1e-6 / (2 * kMass);
+  CHECK(Kinetic(inertia, free) >= kOverdraft);
+  CHECK(Kinetic(inertia, free) <= kOverdraft + kick_j);
+}
+
 TEST_CASE("numbers that are none give nothing") {
   const BodyInertia inertia = Cube();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   BodyState state;
   PushBudget budget;
-  budget.Grant(nan, nan, state);
+  budget.Grant({.work_j = nan, .spring_j = nan}, state);
   Kick kick{.impulse = Vec3(1, 0, 0)};
   budget.Limit(inertia, state, kick);
   CHECK(kick.impulse.isZero(0));
-  budget.Grant(1, 0, state);
+  budget.Grant({.work_j = 1, .spring_j = 0}, state);
   kick = {.impulse = Vec3(nan, 0, 0)};
   budget.Limit(inertia, state, kick);
   kick = {.impulse = Vec3(1e-3, 0, 0)};
