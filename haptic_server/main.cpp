@@ -161,7 +161,7 @@ int Run(int argc, char** argv) {
   CatchOperatorSignals();
   DaemonOptions options = ParseDaemonOptions(
       argc, argv, "haptic_server", kPurpose,
-      {{"device", "simulated|usb|replay", "wins over device.kind"},
+      {{"device", "simulated|usb|mouse|replay", "wins over device.kind"},
        {"selftest", "SECONDS", "says whether this PC holds the loop (default 10 s), and ends",
         "10"},
        {"calibrate", "", "finds out where the motors are, and saves it"},

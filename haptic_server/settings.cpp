@@ -11,6 +11,7 @@ namespace rikiseki::haptic {
 namespace {
 
 constexpr double kLongestZeroingMs = 100;  // from "lost" to zero force
+constexpr double kSureStep = 1.01;         // whatever is rounded on its way
 
 // The keys of the daemon's own file.
 ConfigSchema DaemonSchema(Settings& settings) {
@@ -87,6 +88,7 @@ ConfigSchema DaemonSchema(Settings& settings) {
   schema.Choice("device.kind", &settings.device.kind,
                 {{"simulated", DeviceKind::kSimulated},
                  {"usb", DeviceKind::kUsb},
+                 {"mouse", DeviceKind::kMouse},
                  {"replay", DeviceKind::kReplay}},
                 "Which force display to drive.");
   schema.Path("device.file", &settings.device.file,
@@ -115,18 +117,8 @@ ConfigSchema DaemonSchema(Settings& settings) {
   return schema;
 }
 
-// The keys of a device file.
-ConfigSchema DeviceSchema(SpidarSettings& spidar, UsbSettings& usb) {
-  ConfigSchema schema;
-  AddUsbKeys(schema, usb);
-  schema.Vectors("spidar.motors_m", &spidar.motors_m, -10, 10,
-                 "Where the four strings leave their motors, device axes.");
-  schema.Number("spidar.count_length_m", &spidar.count_length_m, 1e-7, 1e-3,
-                "String length per encoder count.");
-  schema.Number("spidar.tension_min_n", &spidar.tension_min_n, 0, 10,
-                "Tension that keeps a string from going slack.");
-  schema.Number("spidar.tension_max_n", &spidar.tension_max_n, 0.1, 100,
-                "The most a motor may pull.");
+// What any display's file says of its grip.
+void AddGripKeys(ConfigSchema& schema, SpidarSettings& spidar) {
   schema.Number("spidar.velocity_cutoff_hz", &spidar.velocity_cutoff_hz, 1, 4000,
                 "Corner of the first-order velocity filter.");
   schema.Number("spidar.moving_mass_kg", &spidar.moving_mass_kg, 0, 10,
@@ -137,6 +129,26 @@ ConfigSchema DeviceSchema(SpidarSettings& spidar, UsbSettings& usb) {
                 "Dry friction of motors and strings, as felt at the grip.");
   schema.Number("spidar.latency_us", &spidar.latency_us, 0, kLongestLatencyUs,
                 "From a measurement to the force that was computed from it.");
+}
+
+// The keys of a device file.
+ConfigSchema DeviceSchema(Settings& settings) {
+  ConfigSchema schema;
+  SpidarSettings& spidar = settings.spidar;
+  AddGripKeys(schema, spidar);
+  if (settings.device.kind == DeviceKind::kMouse) {
+    AddMouseKeys(schema, settings.mouse);
+    return schema;
+  }
+  AddUsbKeys(schema, settings.usb);
+  schema.Vectors("spidar.motors_m", &spidar.motors_m, -10, 10,
+                 "Where the four strings leave their motors, device axes.");
+  schema.Number("spidar.count_length_m", &spidar.count_length_m, 1e-7, 1e-3,
+                "String length per encoder count.");
+  schema.Number("spidar.tension_min_n", &spidar.tension_min_n, 0, 10,
+                "Tension that keeps a string from going slack.");
+  schema.Number("spidar.tension_max_n", &spidar.tension_max_n, 0.1, 100,
+                "The most a motor may pull.");
   return schema;
 }
 
@@ -175,6 +187,23 @@ std::optional<Conflict> FindConflict(const SpidarSettings& spidar) {
   return std::nullopt;
 }
 
+// What a SPIDAR-mouse wants of the loop.
+std::optional<Conflict> FindMouseLoopConflict(const Settings& settings) {
+  if (settings.period_ns() > kLongestReportPeriodNs) {
+    return Conflict{"loop.rate_hz",
+                    "a SPIDAR-mouse wants its force at least every 4 ms: 250 or more is expected"};
+  }
+  // The slew limit counts from what is shown: a step below the smallest force would never lead there.
+  const double step_n =
+      settings.safety.slew_limit_n_per_s * 1e-9 * static_cast<double>(settings.period_ns());
+  if (!(step_n > kSureStep * settings.mouse.min_force_n)) {
+    return Conflict{"safety.slew_limit_n_per_s",
+                    "in one period of loop.rate_hz the force must be able to reach "
+                    "mouse.min_force_n, below which a SPIDAR-mouse shows none"};
+  }
+  return std::nullopt;
+}
+
 void RequirePositive(const std::string& key, double value) {
   if (!(value > 0) || !std::isfinite(value)) {
     throw std::invalid_argument(key + " must be positive and finite");
@@ -200,7 +229,8 @@ std::int64_t Settings::period_ns() const {
 Settings LoadSettings(const std::string& path, const std::vector<std::string>& set,
                       std::string* description, ConfigValues* values) {
   const auto is_of_device = [](const std::string& assignment) {
-    return assignment.starts_with("spidar.") || assignment.starts_with("usb.");
+    return assignment.starts_with("spidar.") || assignment.starts_with("usb.") ||
+           assignment.starts_with("mouse.");
   };
   Settings settings;
   ConfigSchema daemon = DaemonSchema(settings);
@@ -211,14 +241,15 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
   if (settings.device.file.empty()) daemon.Refuse("device.file", "the display needs a description");
 
   const bool described = settings.device.kind != DeviceKind::kReplay;
-  ConfigSchema device = DeviceSchema(settings.spidar, settings.usb);
+  ConfigSchema device = DeviceSchema(settings);
   if (described) device.Load(settings.device.file);
   for (const std::string& assignment : set) {
     if (is_of_device(assignment)) device.Set(assignment);
   }
 
   if (const auto conflict = FindConflict(settings)) daemon.Refuse(conflict->key, conflict->why);
-  if (const auto conflict = FindConflict(settings.spidar); described && conflict) {
+  const bool has_strings = described && settings.device.kind != DeviceKind::kMouse;
+  if (const auto conflict = FindConflict(settings.spidar); has_strings && conflict) {
     device.Refuse(conflict->key, conflict->why);
   }
   if (settings.device.kind == DeviceKind::kUsb) {
@@ -226,6 +257,14 @@ Settings LoadSettings(const std::string& path, const std::vector<std::string>& s
         FindUsbConflict(settings.usb, kTensionStrings, settings.spidar.tension_max_n,
                         1e-3 * static_cast<double>(settings.period_ns()));
     if (conflict) device.Refuse(conflict->key, conflict->why);
+  }
+  if (settings.device.kind == DeviceKind::kMouse) {
+    if (const auto conflict = FindMouseConflict(settings.mouse)) {
+      device.Refuse(conflict->key, conflict->why);
+    }
+    if (const auto conflict = FindMouseLoopConflict(settings)) {
+      daemon.Refuse(conflict->key, conflict->why);
+    }
   }
   if (description != nullptr) *description = daemon.Describe() + device.Describe();
   if (values != nullptr) {

@@ -8,6 +8,7 @@
 #include "common/config.h"
 #include "common/geometry.h"
 #include "common/rigid_body.h"
+#include "haptic_server/device/mouse/mouse_settings.h"
 #include "haptic_server/device/usb/usb_settings.h"
 
 namespace rikiseki::haptic {
@@ -59,7 +60,7 @@ struct MappingSettings {
   double force_scale = 1;            // s_f, newtons at the device per newton in the world
 };
 
-enum class DeviceKind { kSimulated, kUsb, kReplay };
+enum class DeviceKind { kSimulated, kUsb, kReplay, kMouse };
 
 struct DeviceSettings {
   DeviceKind kind = DeviceKind::kSimulated;
@@ -111,6 +112,7 @@ struct Settings {
   HandSettings hand;
   SpidarSettings spidar;
   UsbSettings usb;
+  MouseSettings mouse;
 
   std::int64_t period_ns() const;
 };

@@ -2,12 +2,10 @@
 
 #include <cmath>
 #include <iomanip>
-#include <numbers>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
-#include "common/clock.h"
 #include "common/exit_code.h"
 #include "haptic_server/device/hand.h"
 #include "haptic_server/device/simulated_board.h"
@@ -27,7 +25,7 @@ Spidar::Spidar(const SpidarSettings& settings, std::unique_ptr<MotorBoard> board
 DeviceStatus Spidar::Read(std::int64_t now_ns, DeviceSample& sample) noexcept {
   EncoderCounts counts{};
   if (!board_->ReadCounts(now_ns, counts)) {
-    moving_ = false;
+    velocity_.Restart();
     return DeviceStatus::kFault;
   }
   sample.enabled = board_->Enabled();
@@ -38,25 +36,16 @@ DeviceStatus Spidar::Read(std::int64_t now_ns, DeviceSample& sample) noexcept {
   }
   const SpidarKinematics::Fix fix = kinematics_.Solve(lengths);
   if (!(fix.residual_m <= kSlipResidual) || !fix.position.allFinite()) {
-    moving_ = false;
+    velocity_.Restart();
     Blame(lengths);
     return DeviceStatus::kFault;
-  }
-  const double dt = Seconds(now_ns - read_ns_);
-  if (!moving_) {
-    velocity_.setZero();
-  } else if (dt > 0) {
-    const double weight = -std::expm1(-2 * std::numbers::pi * settings_.velocity_cutoff_hz * dt);
-    velocity_ += weight * ((fix.position - position_) / dt - velocity_);
   }
   wrong_string_.store({}, std::memory_order_relaxed);
   if (fix.residual_m <= kSoundResidual || !located_) sound_position_ = fix.position;
   located_ = true;
-  moving_ = true;
-  read_ns_ = now_ns;
   position_ = fix.position;
   sample.position = position_;
-  sample.velocity = velocity_;
+  sample.velocity = velocity_.Update(now_ns, position_, settings_.velocity_cutoff_hz);
   sample.target = board_->hand() != nullptr ? board_->hand()->target() : position_;
   return DeviceStatus::kOk;
 }

@@ -9,6 +9,7 @@
 #include "haptic_server/device/device.h"
 #include "haptic_server/device/motor_board.h"
 #include "haptic_server/device/spidar_kinematics.h"
+#include "haptic_server/device/velocity_filter.h"
 #include "haptic_server/settings.h"
 
 namespace rikiseki::haptic {
@@ -51,10 +52,8 @@ class Spidar final : public Device {
   std::unique_ptr<MotorBoard> board_;
   SpidarKinematics kinematics_;
   PerString home_lengths_;
-  bool moving_ = false;  // a sample came before: velocity can be estimated
-  std::int64_t read_ns_ = 0;
   Vec3 position_ = Vec3::Zero();
-  Vec3 velocity_ = Vec3::Zero();
+  VelocityFilter velocity_;
   bool located_ = false;  // there was a position before
   Vec3 sound_position_ = Vec3::Zero();
   std::atomic<WrongString> wrong_string_{WrongString()};

@@ -28,8 +28,10 @@ constexpr int kPollMs = 100;
 // The simulated hand does what the prompts ask for.
 std::unique_ptr<MotorBoard> OpenBoardFor(Procedure procedure, const Settings& settings) {
   if (settings.device.kind == DeviceKind::kUsb) return OpenUsbBoard(settings);
-  if (settings.device.kind == DeviceKind::kReplay) {
-    throw StartError(kExitUsage, "a recording has no device: set device.kind to usb or simulated");
+  if (settings.device.kind == DeviceKind::kReplay || settings.device.kind == DeviceKind::kMouse) {
+    throw StartError(kExitUsage,
+                     "a recording has no device, a SPIDAR-mouse no strings that are counted: set "
+                     "device.kind to usb or simulated");
   }
   try {
     return std::make_unique<SimulatedBoard>(settings.spidar, procedure == Procedure::kCalibrate

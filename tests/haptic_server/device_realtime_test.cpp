@@ -2,12 +2,14 @@
 // path: nothing is allocated, nothing locked.
 #include <catch2/catch.hpp>
 
+#include "haptic_server/device/mouse/spidar_mouse.h"
 #include "haptic_server/device/spidar_kinematics.h"
 #include "haptic_server/device/tension.h"
 #include "haptic_server/device/usb/usb_board.h"
 #include "tests/haptic_server/device/g6x3.h"
 #include "tests/haptic_server/guard.h"
 #include "tests/usb/canned_port.h"
+#include "tests/usb/written_mouse.h"
 
 namespace rikiseki::haptic {
 namespace {
@@ -77,6 +79,31 @@ TEST_CASE("boards on the USB: answered or not, the driver allocates nothing and 
     CHECK(read % 1'000 >= 5 * 61);
     CHECK(read > 1'000);
   }
+}
+
+TEST_CASE(
+    "a SPIDAR-mouse: moved, stopped, answered or not, the driver allocates and locks nothing") {
+  const test::WrittenMouse hand;
+  MouseSettings settings;
+  settings.event = hand.path();
+  auto made = std::make_unique<test::CannedPort>(UsbBoardModel::kMouse);
+  test::CannedPort& port = *made;
+  SpidarMouse device(settings, 100, std::move(made));
+  DeviceSample sample;
+  const long allocations = test::Allocations();
+  const long locks = test::Locks();
+  int read = 0;
+  for (std::int64_t tick = 0; tick < 500; ++tick) {
+    port.is_silent = tick % 100 > 60;  // long enough to be given up, and taken again
+    hand.Move(1, 2);
+    read += device.Read(tick * 1'000'000, sample) == DeviceStatus::kOk ? 1 : 0;
+    device.Write(Vec3(1, 0.01 * static_cast<double>(tick), 0));
+    if (tick % 50 == 0) device.Release();
+    read += *device.Trouble() == '\0' ? 0 : 1'000;
+  }
+  CHECK(test::Allocations() == allocations);
+  CHECK(test::Locks() == locks);
+  CHECK(read % 1'000 >= 5 * 61);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// A port that answers every request at once and always the same: what the driver itself costs, and
+// A port that answers every request at once and always the same, as far as its board answers: what the driver itself costs, and
 // whether it allocates.
 #pragma once
 
@@ -25,7 +25,7 @@ class CannedPort final : public haptic::UsbPort {
   }
 
   std::optional<std::span<const std::uint8_t>> Receive(std::int64_t) noexcept override {
-    if (is_silent) return std::nullopt;
+    if (is_silent || model_ == haptic::UsbBoardModel::kMouse) return std::nullopt;
     return std::span<const std::uint8_t>(reply_.data(), model_ == haptic::UsbBoardModel::kSh4
                                                             ? haptic::sh4::kPacketBytes
                                                             : haptic::simple::kPacketBytes);

@@ -9,11 +9,11 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "haptic_server/device/simulated_board.h"
 #include "haptic_server/settings.h"
+#include "tests/usb/emulated_firmware.h"
 
 namespace rikiseki::test {
 
@@ -26,7 +26,7 @@ struct BoardFaults {
   bool foreign_firmware = false;           // answers to nothing it should, and nonsense to the rest
 };
 
-class EmulatedBoard {
+class EmulatedBoard final : public EmulatedFirmware {
  public:
   /// When the hand goes through its script.
   enum class Begins { kByItself, kOnRequest };
@@ -43,13 +43,10 @@ class EmulatedBoard {
   /// many, and only then begins its script.
   void HoldInTheMiddle(int ticks, std::int64_t tick_ns);
 
-  /// One packet from the host, when the hand's clock shows `now_ns`: moves the hand on to there if the
-  /// packet asks for the counters. The firmware's answer, if it has one.
+  /// Moves the hand on to `now_ns` if the packet asks for the counters.
   std::optional<std::vector<std::uint8_t>> Handle(std::span<const std::uint8_t> packet,
-                                                  std::int64_t now_ns);
-
-  /// A tick of the firmware.
-  void FirmwareTick();
+                                                  std::int64_t now_ns) override;
+  void FirmwareTick() override;
 
   /// As after a loss of power.
   void ForgetCounters();

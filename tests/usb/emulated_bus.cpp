@@ -93,12 +93,16 @@ EmulatedBus::Status EmulatedBus::status() {
   return status;
 }
 
+std::vector<std::string> EmulatedBus::OnBus(const std::vector<std::string>& command) {
+  std::vector<std::string> wrapped = {"/usr/bin/env", "UMOCKDEV_DIR=" + Tell("root"),
+                                      "/usr/bin/umockdev-wrapper"};
+  wrapped.insert(wrapped.end(), command.begin(), command.end());
+  return wrapped;
+}
+
 std::vector<std::string> EmulatedBus::HapticCommand(const std::string& instance,
                                                     const std::vector<std::string>& more) {
-  std::vector<std::string> command = {"/usr/bin/env",
-                                      "UMOCKDEV_DIR=" + Tell("root"),
-                                      "/usr/bin/umockdev-wrapper",
-                                      Program("haptic_server"),
+  std::vector<std::string> command = {Program("haptic_server"),
                                       "--config",
                                       SourceFile("config/haptic_server.ini"),
                                       "--device",
@@ -109,7 +113,7 @@ std::vector<std::string> EmulatedBus::HapticCommand(const std::string& instance,
     command.insert(command.end(), {"--set", setting});
   }
   command.insert(command.end(), more.begin(), more.end());
-  return command;
+  return OnBus(command);
 }
 
 }  // namespace rikiseki::test

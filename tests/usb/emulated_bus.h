@@ -33,7 +33,10 @@ class EmulatedBus {
   };
   Status status();
 
-  /// haptic_server on this bus.
+  /// A command line whose program runs on this bus.
+  std::vector<std::string> OnBus(const std::vector<std::string>& command);
+
+  /// haptic_server on this bus, with the board of the device file.
   std::vector<std::string> HapticCommand(const std::string& instance,
                                          const std::vector<std::string>& more = {});
 

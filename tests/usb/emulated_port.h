@@ -7,13 +7,13 @@
 #include <vector>
 
 #include "haptic_server/device/usb/usb_port.h"
-#include "tests/usb/emulated_board.h"
+#include "tests/usb/emulated_firmware.h"
 
 namespace rikiseki::test {
 
 class EmulatedPort final : public haptic::UsbPort {
  public:
-  explicit EmulatedPort(EmulatedBoard& board) : board_(board) {}
+  explicit EmulatedPort(EmulatedFirmware& board) : board_(board) {}
 
   /// To be set before each tick: the hand's clock.
   std::int64_t now_ns = 0;
@@ -76,7 +76,7 @@ class EmulatedPort final : public haptic::UsbPort {
     int ticks = 0;
     std::vector<std::uint8_t> bytes;
   };
-  EmulatedBoard& board_;
+  EmulatedFirmware& board_;
   std::deque<Late> replies_;
   std::vector<std::uint8_t> received_;
 };

@@ -1,7 +1,8 @@
-// usb_emulator: a Cyverse board with strings and a hand behind it, for the whole, unmodified daemon:
+// usb_emulator: a Cyverse board with strings and a hand behind it, or a SPIDAR-mouse, for the whole,
+// unmodified daemon:
 //
 //   umockdev-wrapper usb_emulator --config haptic_server.ini --control SOCKET
-//       [--set device.file=... ] [--switch N] [--tick-us US] [--on-request]
+//       [--set device.file=... ] [--switch N] [--tick-us US] [--on-request] [--middle-ticks N]
 //   UMOCKDEV_DIR=<what `root` answers> umockdev-wrapper haptic_server --device usb ...
 //
 // It listens on a socket for one command a line, and answers each with one line (Commands below). The
@@ -29,6 +30,7 @@
 #include "common/command_line.h"
 #include "common/daemon.h"
 #include "tests/usb/emulated_board.h"
+#include "tests/usb/emulated_mouse.h"
 #include "tests/usb/usbfs.h"
 
 namespace {
@@ -37,7 +39,6 @@ using namespace rikiseki;        // NOLINT(google-build-using-namespace)
 using namespace rikiseki::test;  // NOLINT(google-build-using-namespace)
 
 constexpr std::int64_t kSilenceNs = 100'000'000;
-constexpr int kTicksInTheMiddle = 100;
 
 struct Options {
   std::string config;
@@ -46,6 +47,7 @@ struct Options {
   int switch_id = 5;
   int tick_us = 1000;
   bool on_request = false;
+  int middle_ticks = 100;
 };
 
 // A board on the bus: firmware, hand and the clock of the hand. Guarded by `mutex`.
@@ -65,7 +67,7 @@ class BoardOnBus {
                   settings.usb.board == haptic::UsbBoardModel::kSh4 ? 0x0205 : 0x0203),
               .number = number},
              [this](const std::vector<std::uint8_t>& packet) { return Answer(packet); }) {
-    board_.HoldInTheMiddle(kTicksInTheMiddle, tick_ns_);
+    board_.HoldInTheMiddle(options.middle_ticks, tick_ns_);
   }
 
   EmulatedBoard& board() { return board_; }
@@ -110,6 +112,9 @@ class Emulator {
         second_(testbed, mutex_, settings, options, 3),
         blank_(testbed, mutex_, {.vendor = 0x04B4, .product = 0x8613, .number = 4},
                [](const auto&) { return std::nullopt; }),
+        mouse_bus_(testbed, mutex_,
+                   {.vendor = 0x04D8, .product = 0x003F, .number = 5, .is_hid = true},
+                   [this](const auto& packet) { return mouse_.Handle(packet, 0); }),
         clock_([this] {
           while (!stop_) {
             SleepUntil(MonotonicNow() + 1'000'000);
@@ -140,7 +145,9 @@ class Emulator {
         {"plug_second", [&] { second_.bus().Plug(); }},
         {"unplug_second", [&] { second_.bus().Unplug(); }},
         {"plug_blank", [&] { blank_.Plug(); }},
-        {"unplug_blank", [&] { blank_.Unplug(); }}};
+        {"unplug_blank", [&] { blank_.Unplug(); }},
+        {"plug_mouse", [&] { mouse_bus_.Plug({}, what != "forbidden"); }},
+        {"unplug_mouse", [&] { mouse_bus_.Unplug(); }}};
     const std::map<std::string, std::function<void()>> locked = {
         {"begin", [&] { board.Begin(); }},
         {"forget", [&] { board.ForgetCounters(); }},  // the power was away as well
@@ -164,6 +171,7 @@ class Emulator {
       return text;
     }
     if (verb == "status") return Status();
+    if (verb == "mouse_status") return MouseStatus();
     if (const auto found = outside.find(verb); found != outside.end()) {
       found->second();
     } else if (const auto inside = locked.find(verb); inside != locked.end()) {
@@ -187,11 +195,22 @@ class Emulator {
     return text.str();
   }
 
+  // started, force x and y [N], forces, stops, nonsense
+  std::string MouseStatus() {
+    const std::lock_guard lock(mutex_);
+    std::ostringstream text;
+    text << mouse_.is_started() << " " << mouse_.force()[0] << " " << mouse_.force()[1] << " "
+         << mouse_.forces() << " " << mouse_.stops() << " " << mouse_.nonsense();
+    return text.str();
+  }
+
   UMockdevTestbed* testbed_;
   std::mutex mutex_;
   BoardOnBus first_;
   BoardOnBus second_;
   UsbFs blank_;
+  EmulatedMouse mouse_;
+  UsbFs mouse_bus_;
   std::atomic<bool> stop_{false};
   std::thread clock_;
 };
@@ -239,7 +258,8 @@ int Run(int argc, char** argv) {
       "control", po::value(&options.control)->required(), "socket for commands")(
       "switch", po::value(&options.switch_id), "where the rotary switch stands")(
       "tick-us", po::value(&options.tick_us), "that the hand moves on by a tick")(
-      "on-request", po::bool_switch(&options.on_request), "the hand waits for `begin`");
+      "on-request", po::bool_switch(&options.on_request), "the hand waits for `begin`")(
+      "middle-ticks", po::value(&options.middle_ticks), "for which the hand stays there first");
   ParseCommandLine(argc, argv, line);
   options.set.emplace_back("device.kind=usb");
   const haptic::Settings settings = haptic::LoadSettings(options.config, options.set);

@@ -124,9 +124,11 @@ void UsbFs::Ioctl(UMockdevIoctlClient* client) {
       return;
     }
     case USBDEVFS_CLAIMINTERFACE:
+    case USBDEVFS_DISCONNECT_CLAIM:
       return faults.busy ? complete(-1, EBUSY) : complete(0, 0);
     case USBDEVFS_RELEASEINTERFACE:
     case USBDEVFS_SETINTERFACE:
+    case USBDEVFS_IOCTL:  // the kernel's driver may come back
       return complete(0, 0);
     case USBDEVFS_CLEAR_HALT: {
       UMockdevIoctlData* data = umockdev_ioctl_data_resolve(argument, 0, sizeof(unsigned), nullptr);

@@ -25,14 +25,15 @@ struct BusFaults {
 
 class UsbFs {
  public:
-  /// What a packet to EP 0x02 is answered with from EP 0x86. Called with the lock of `mutex` held.
+  /// What a packet to the OUT endpoint is answered with from the IN endpoint. Called with the lock of `mutex` held.
   using Function = std::function<std::optional<std::vector<std::uint8_t>>(
       const std::vector<std::uint8_t>& packet)>;
 
   struct Identity {
     std::uint16_t vendor = 0;
     std::uint16_t product = 0;
-    int number = 2;  // on the bus, from 2
+    int number = 2;       // on the bus, from 2
+    bool is_hid = false;  // interrupt endpoints EP1, 64 bytes, instead of bulk EP2 and EP6
   };
 
   /// `testbed` outlives it. `mutex` guards everything that ioctls touch.

@@ -33,17 +33,30 @@ std::uint8_t High(std::uint16_t word) {
   return static_cast<std::uint8_t>(word >> 8);
 }
 
-// Device, one configuration, one interface whose setting 1 has the pipes: bulk, EP2 out and EP6 in,
-// 512 bytes. Setting 0 has none, as EZ-USB firmware likes it.
-std::vector<std::uint8_t> Descriptors(std::uint16_t vendor, std::uint16_t product) {
-  return {
-      18, 1, 0,    2, 0xFF, 0,    0, 64,   Low(vendor), High(vendor), Low(product), High(product),
-      1,  0, 0,    0, 0,    1,                  // device
-      9,  2, 41,   0, 1,    1,    0, 0xC0, 50,  // configuration
-      9,  4, 0,    0, 0,    0xFF, 0, 0,    0,   // interface 0, setting 0
-      9,  4, 0,    1, 2,    0xFF, 0, 0,    0,   // setting 1
-      7,  5, 0x02, 2, 0,    2,    0,            // EP2 out
-      7,  5, 0x86, 2, 0,    2,    0};           // EP6 in
+// Device and one configuration of one interface. A HID's has its pipes at once: interrupt, EP1 out and in, 64
+// bytes, as Microchip's have. Else they are in setting 1: bulk, EP2 out and EP6 in, 512 bytes; setting 0 has
+// none, as EZ-USB firmware likes it.
+std::vector<std::uint8_t> Descriptors(const UsbFs::Identity& identity) {
+  const std::uint16_t vendor = identity.vendor;
+  const std::uint16_t product = identity.product;
+  std::vector<std::uint8_t> device = {
+      18, 1, 0, 2, 0, 0, 0, 64, Low(vendor), High(vendor), Low(product), High(product),
+      1,  0, 0, 0, 0, 1};
+  const std::vector<std::uint8_t> of_hid = {9, 2,    41,   0, 1,  1, 0,  0xC0, 50,  // configuration
+                                            9, 4,    0,    0, 2,  3, 0,  0,    0,   // interface 0
+                                            9, 0x21, 17,   1, 0,  1, 34, 29,   0,   // HID
+                                            7, 5,    1,    3, 64, 0, 1,             // EP1 out
+                                            7, 5,    0x81, 3, 64, 0, 1};            // EP1 in
+  const std::vector<std::uint8_t> of_board = {
+      9, 2, 41,   0, 1, 1,    0, 0xC0, 50,  // configuration
+      9, 4, 0,    0, 0, 0xFF, 0, 0,    0,   // interface 0, setting 0
+      9, 4, 0,    1, 2, 0xFF, 0, 0,    0,   // setting 1
+      7, 5, 0x02, 2, 0, 2,    0,            // EP2 out
+      7, 5, 0x86, 2, 0, 2,    0};           // EP6 in
+  if (!identity.is_hid) device[4] = 0xFF;
+  const std::vector<std::uint8_t>& rest = identity.is_hid ? of_hid : of_board;
+  device.insert(device.end(), rest.begin(), rest.end());
+  return device;
 }
 
 std::string Three(int number) {
@@ -68,7 +81,7 @@ UsbFs::UsbFs(UMockdevTestbed* testbed, std::mutex& mutex, const Identity& identi
       function_(std::move(function)),
       name_("1-" + std::to_string(identity.number - 1)),
       node_("/dev/bus/usb/001/" + Three(identity.number)),
-      descriptors_(Descriptors(identity.vendor, identity.product)) {
+      descriptors_(Descriptors(identity)) {
   handler_ = umockdev_ioctl_base_new();
   g_signal_connect(handler_, "handle-ioctl", G_CALLBACK(OnIoctl), this);
   g_signal_connect(handler_, "client-vanished", G_CALLBACK(OnVanished), this);

@@ -168,6 +168,7 @@ std::string LibusbPort::Complaint() const {
 }
 
 std::string LibusbPort::Name() const {
+  if (usb_.board == UsbBoardModel::kMouse) return "SPIDAR-mouse on USB";
   return "SPIDAR on USB " + std::string(usb_.board == UsbBoardModel::kSimple ? "Simple" : "Sh4");
 }
 

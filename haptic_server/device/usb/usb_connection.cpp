@@ -27,47 +27,56 @@ UsbTrouble TroubleOf(int error) {
   }
 }
 
+// Either way, and waits. How many bytes went, or libusb's error.
+int TransferNow(const OpenBoard& board, std::uint8_t endpoint, std::span<std::uint8_t> bytes,
+                unsigned timeout_ms) {
+  const auto transfer = board.pipes.type == LIBUSB_TRANSFER_TYPE_INTERRUPT
+                            ? libusb_interrupt_transfer
+                            : libusb_bulk_transfer;
+  int moved = 0;
+  const int error = transfer(board.handle.get(), endpoint, bytes.data(),
+                             static_cast<int>(bytes.size()), &moved, timeout_ms);
+  return error == 0 ? moved : error;
+}
+
 }  // namespace
 
 void OpenBoard::Write(std::span<const std::uint8_t> packet, unsigned timeout_ms) {
-  int sent = 0;
-  const int error =
-      libusb_bulk_transfer(handle.get(), kOutEndpoint, const_cast<std::uint8_t*>(packet.data()),
-                           static_cast<int>(packet.size()), &sent, timeout_ms);
-  if (error != 0 || sent != static_cast<int>(packet.size())) {
+  const int sent =
+      TransferNow(*this, pipes.out_endpoint,
+                  {const_cast<std::uint8_t*>(packet.data()), packet.size()}, timeout_ms);
+  if (sent != static_cast<int>(packet.size())) {
+    const int error = std::min(sent, 0);
     throw UsbError(TroubleOf(error),
                    "the board at " + place + " takes no command: " + libusb_error_name(error));
   }
 }
 
 std::vector<std::uint8_t> OpenBoard::Read(unsigned timeout_ms) {
-  std::vector<std::uint8_t> reply(kUsbPacketBytes);
-  int received = 0;
-  const int error = libusb_bulk_transfer(handle.get(), kInEndpoint, reply.data(),
-                                         static_cast<int>(reply.size()), &received, timeout_ms);
-  if (error != 0 && error != LIBUSB_ERROR_TIMEOUT) {
-    throw UsbError(TroubleOf(error),
-                   "the board at " + place + " gives no answer: " + libusb_error_name(error));
+  std::vector<std::uint8_t> reply(pipes.answer_bytes);
+  const int received = TransferNow(*this, pipes.in_endpoint, reply, timeout_ms);
+  if (received < 0 && received != LIBUSB_ERROR_TIMEOUT) {
+    throw UsbError(TroubleOf(received),
+                   "the board at " + place + " gives no answer: " + libusb_error_name(received));
   }
-  reply.resize(error == 0 ? static_cast<std::size_t>(received) : 0);
+  reply.resize(static_cast<std::size_t>(std::max(received, 0)));
   return reply;
 }
 
 UsbConnection::UsbConnection(OpenBoard board) : board_(std::move(board)) {
-  for (Slot& slot : in_) slot.owner = this;
-  for (Slot& slot : out_) slot.owner = this;
-  for (Slot& slot : in_) {
+  const auto fill = [&](Slot& slot, std::uint8_t endpoint, std::size_t bytes,
+                        libusb_transfer_cb_fn completed) {
+    slot.owner = this;
     slot.transfer.reset(libusb_alloc_transfer(0));
     // No time limit of libusb's: it would arm a timer with each; the tick has its own deadline.
-    libusb_fill_bulk_transfer(slot.transfer.get(), board_.handle.get(), kInEndpoint,
-                              slot.buffer.data(), static_cast<int>(slot.buffer.size()), InCompleted,
-                              &slot, 0);
+    libusb_fill_bulk_transfer(slot.transfer.get(), board_.handle.get(), endpoint,
+                              slot.buffer.data(), static_cast<int>(bytes), completed, &slot, 0);
+    slot.transfer->type = static_cast<unsigned char>(board_.pipes.type);
+  };
+  for (Slot& slot : in_) {
+    fill(slot, board_.pipes.in_endpoint, board_.pipes.answer_bytes, InCompleted);
   }
-  for (Slot& slot : out_) {
-    slot.transfer.reset(libusb_alloc_transfer(0));
-    libusb_fill_bulk_transfer(slot.transfer.get(), board_.handle.get(), kOutEndpoint,
-                              slot.buffer.data(), 0, OutCompleted, &slot, 0);
-  }
+  for (Slot& slot : out_) fill(slot, board_.pipes.out_endpoint, 0, OutCompleted);
   for (Slot& slot : in_) {
     if (!Submit(slot)) {
       Drain(MonotonicNow() + kCloseWithinNs);
@@ -92,7 +101,9 @@ UsbConnection::~UsbConnection() {
   }
   Drain(MonotonicNow() + kCloseWithinNs);
   if (trouble_ != UsbTrouble::kUnplugged) {
-    if (trouble_ == UsbTrouble::kStalled) libusb_clear_halt(board_.handle.get(), kOutEndpoint);
+    if (trouble_ == UsbTrouble::kStalled) {
+      libusb_clear_halt(board_.handle.get(), board_.pipes.out_endpoint);
+    }
     try {
       board_.Write(board_.zero_packet, kZeroWithinMs);
     } catch (const UsbError&) {  // then the firmware has to

@@ -14,13 +14,20 @@
 #include <vector>
 
 #include "haptic_server/device/usb/usb_port.h"
+#include "haptic_server/device/usb/usb_settings.h"
 
 namespace rikiseki::haptic {
 
-/// Both boards: bulk, EP2 out and EP6 in (Springhead DRCyUsb20Sh4; pipes 1 and 2 of the EZ-USB driver).
-inline constexpr std::uint8_t kOutEndpoint = 0x02;
-inline constexpr std::uint8_t kInEndpoint = 0x86;
 inline constexpr std::size_t kUsbPacketBytes = 512;
+
+/// The way packets go to a board and answers come back. The Cyverse boards: bulk, EP2 out and EP6 in
+/// (Springhead DRCyUsb20Sh4; pipes 1 and 2 of the EZ-USB driver).
+struct UsbPipes {
+  libusb_transfer_type type = LIBUSB_TRANSFER_TYPE_BULK;
+  std::uint8_t out_endpoint = 0x02;
+  std::uint8_t in_endpoint = 0x86;
+  std::size_t answer_bytes = kUsbPacketBytes;  // the most: a transfer ends where they are full
+};
 
 struct LibusbDeleter {
   void operator()(libusb_context* context) const { libusb_exit(context); }
@@ -34,8 +41,9 @@ using LibusbHandle = std::unique_ptr<libusb_device_handle, LibusbDeleter>;
 struct OpenBoard {
   LibusbContext context;
   LibusbHandle handle;
+  UsbPipes pipes;
   int interface_number = 0;
-  int switch_id = 0;
+  int switch_id = kAnySwitch;               // a board that has none
   std::string serial;                       // empty: it has none
   std::string place;                        // "bus 1 device 2"
   std::vector<std::uint8_t> zero_packet{};  // takes all motors to zero

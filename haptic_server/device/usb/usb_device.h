@@ -10,7 +10,7 @@
 
 namespace rikiseki::haptic {
 
-/// As MakeDevice, and the SPIDAR on the USB as well: whether it is plugged in or not. Throws StartError.
+/// As MakeDevice, and the SPIDARs on the USB as well: whether they are plugged in or not. Throws StartError.
 std::unique_ptr<Device> OpenDevice(const Settings& settings);
 
 /// The board alone, likewise.

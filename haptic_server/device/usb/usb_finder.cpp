@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/clock.h"
+#include "haptic_server/device/mouse/mouse_packets.h"
 #include "haptic_server/device/usb/sh4_packets.h"
 #include "haptic_server/device/usb/simple_packets.h"
 #include "haptic_server/device/usb/string_channels.h"
@@ -14,7 +15,7 @@
 namespace rikiseki::haptic {
 namespace {
 
-constexpr std::uint16_t kVendorId = 0x0CEC;  // Cyverse
+constexpr std::uint16_t kCyverseVendorId = 0x0CEC;
 // An EZ-USB FX2 whose EEPROM is blank, or not read: no public material can program a board.
 constexpr std::uint16_t kBlankVendorId = 0x04B4;
 constexpr std::uint16_t kBlankProductId = 0x8613;
@@ -46,8 +47,13 @@ LibusbContext NewContext() {
   return LibusbContext(context);
 }
 
-std::uint16_t ProductOf(UsbBoardModel model) {
-  return model == UsbBoardModel::kSimple ? simple::kProductId : sh4::kProductId;
+bool IsOf(UsbBoardModel model, const libusb_device_descriptor& description) {
+  if (model == UsbBoardModel::kMouse) {
+    return description.idVendor == mouse::kVendorId && description.idProduct == mouse::kProductId;
+  }
+  return description.idVendor == kCyverseVendorId &&
+         description.idProduct ==
+             (model == UsbBoardModel::kSimple ? simple::kProductId : sh4::kProductId);
 }
 
 std::string PlaceOf(libusb_device* device) {
@@ -63,17 +69,34 @@ std::string SerialOf(libusb_device_handle* handle, const libusb_device_descripto
   return length <= 0 ? "" : std::string(text.begin(), text.begin() + length);
 }
 
-bool HasBulkEndpoint(const libusb_interface_descriptor& interface, std::uint8_t address) {
-  return std::any_of(interface.endpoint, interface.endpoint + interface.bNumEndpoints,
-                     [&](const libusb_endpoint_descriptor& endpoint) {
-                       return endpoint.bEndpointAddress == address &&
-                              (endpoint.bmAttributes & LIBUSB_TRANSFER_TYPE_MASK) ==
-                                  LIBUSB_TRANSFER_TYPE_BULK;
-                     });
+// Of the Cyverse boards the endpoints are known, of the SPIDAR-mouse that it is a HID: it has one
+// interrupt endpoint each way then.
+std::optional<UsbPipes> PipesOf(UsbBoardModel model, const libusb_interface_descriptor& setting) {
+  const bool is_mouse = model == UsbBoardModel::kMouse;
+  if (is_mouse && setting.bInterfaceClass != LIBUSB_CLASS_HID) return std::nullopt;
+  const auto end = setting.endpoint + setting.bNumEndpoints;
+  const auto address = [&](std::uint8_t direction, std::uint8_t known) {
+    const auto endpoint = std::find_if(setting.endpoint, end, [&](const auto& candidate) {
+      const int type = candidate.bmAttributes & LIBUSB_TRANSFER_TYPE_MASK;
+      return is_mouse ? type == LIBUSB_TRANSFER_TYPE_INTERRUPT &&
+                            (candidate.bEndpointAddress & LIBUSB_ENDPOINT_DIR_MASK) == direction
+                      : type == LIBUSB_TRANSFER_TYPE_BULK && candidate.bEndpointAddress == known;
+    });
+    return endpoint == end ? std::uint8_t{0} : endpoint->bEndpointAddress;
+  };
+  UsbPipes pipes;
+  pipes.out_endpoint = address(LIBUSB_ENDPOINT_OUT, pipes.out_endpoint);
+  pipes.in_endpoint = address(LIBUSB_ENDPOINT_IN, pipes.in_endpoint);
+  if (pipes.out_endpoint == 0 || pipes.in_endpoint == 0) return std::nullopt;
+  if (is_mouse) {
+    pipes.type = LIBUSB_TRANSFER_TYPE_INTERRUPT;
+    pipes.answer_bytes = mouse::kReportBytes;
+  }
+  return pipes;
 }
 
 // Numbers of interface and setting stand nowhere; the two endpoints tell them.
-void ClaimPipes(OpenBoard& board) {
+void ClaimPipes(UsbBoardModel model, OpenBoard& board) {
   libusb_config_descriptor* raw = nullptr;
   libusb_get_active_config_descriptor(libusb_get_device(board.handle.get()), &raw);
   const std::unique_ptr<libusb_config_descriptor, decltype(&libusb_free_config_descriptor)> config(
@@ -82,10 +105,12 @@ void ClaimPipes(OpenBoard& board) {
     const libusb_interface& interface = config->interface[i];
     for (int k = 0; k < interface.num_altsetting; ++k) {
       const libusb_interface_descriptor& setting = interface.altsetting[k];
-      if (!HasBulkEndpoint(setting, kOutEndpoint) || !HasBulkEndpoint(setting, kInEndpoint)) {
-        continue;
-      }
+      const std::optional<UsbPipes> pipes = PipesOf(model, setting);
+      if (!pipes) continue;
+      board.pipes = *pipes;
       board.interface_number = setting.bInterfaceNumber;
+      // The kernel's own driver, which a HID has, makes way until the interface is released.
+      libusb_set_auto_detach_kernel_driver(board.handle.get(), model == UsbBoardModel::kMouse);
       const int error = libusb_claim_interface(board.handle.get(), board.interface_number);
       if (error == LIBUSB_ERROR_BUSY) {
         throw UsbError(UsbTrouble::kBusy, "another program uses the board at " + board.place +
@@ -105,8 +130,10 @@ void ClaimPipes(OpenBoard& board) {
   }
   throw UsbError(UsbTrouble::kNoPipes,
                  "the board at " + board.place +
-                     " has no interface with bulk endpoints 0x02 out and 0x86 in: its firmware is "
-                     "not one that this driver knows");
+                     (model == UsbBoardModel::kMouse
+                          ? " has no HID interface with interrupt endpoints out and in"
+                          : " has no interface with bulk endpoints 0x02 out and 0x86 in") +
+                     ": its firmware is not one that this driver knows");
 }
 
 void RequireAnswer(const OpenBoard& board, const std::vector<std::uint8_t>& reply) {
@@ -154,10 +181,16 @@ int IdentifySh4(OpenBoard& board) {
   return SwitchId(reply->parallel_port);
 }
 
+// What the answer says is not known; that there is one, is.
+void IdentifyMouse(OpenBoard& board) {
+  board.Write(mouse::EncodeStateRequest(), kAnswerWithinMs);
+  RequireAnswer(board, board.Read(kAnswerWithinMs));
+}
+
 // What an earlier owner asked for and did not fetch would shift all answers by one.
 void Drain(OpenBoard& board) {
-  libusb_clear_halt(board.handle.get(), kOutEndpoint);
-  libusb_clear_halt(board.handle.get(), kInEndpoint);
+  libusb_clear_halt(board.handle.get(), board.pipes.out_endpoint);
+  libusb_clear_halt(board.handle.get(), board.pipes.in_endpoint);
   for (int i = 0; i < kMostStaleReplies; ++i) {
     if (board.Read(kDrainWithinMs).empty()) return;
   }
@@ -202,14 +235,18 @@ std::optional<OpenBoard> Open(const UsbSettings& usb, libusb_device* found,
 
 void Identify(const UsbSettings& usb, OpenBoard& board) {
   Drain(board);
-  if (usb.board == UsbBoardModel::kSimple) {
+  const auto zero_by = [&](const auto& packet) {
+    board.zero_packet.assign(packet.begin(), packet.end());
+  };
+  if (usb.board == UsbBoardModel::kMouse) {
+    IdentifyMouse(board);
+    zero_by(mouse::EncodeStop());
+  } else if (usb.board == UsbBoardModel::kSimple) {
     board.switch_id = IdentifySimple(board);
-    const auto zero = simple::EncodeDigits({});
-    board.zero_packet.assign(zero.begin(), zero.end());
+    zero_by(simple::EncodeDigits({}));
   } else {
     board.switch_id = IdentifySh4(board);
-    const auto zero = sh4::EncodeUpdate({});
-    board.zero_packet.assign(zero.begin(), zero.end());
+    zero_by(sh4::EncodeUpdate({}));
   }
 }
 
@@ -231,11 +268,10 @@ OpenBoard FindBoard(const UsbSettings& usb) {
   for (ssize_t i = 0; i < list.count; ++i) {
     libusb_device_descriptor description{};
     if (libusb_get_device_descriptor(list.devices[i], &description) != 0) continue;
-    is_blank_there = is_blank_there || (description.idVendor == kBlankVendorId &&
+    is_blank_there = is_blank_there || (usb.board != UsbBoardModel::kMouse &&
+                                        description.idVendor == kBlankVendorId &&
                                         description.idProduct == kBlankProductId);
-    if (description.idVendor != kVendorId || description.idProduct != ProductOf(usb.board)) {
-      continue;
-    }
+    if (!IsOf(usb.board, description)) continue;
     std::optional<OpenBoard> opened = Open(usb, list.devices[i], description);
     if (!opened) continue;
     OpenBoard& board = *opened;
@@ -244,7 +280,7 @@ OpenBoard FindBoard(const UsbSettings& usb) {
                 (board.serial.empty() ? "none" : board.serial) + ")";
       continue;
     }
-    ClaimPipes(board);
+    ClaimPipes(usb.board, board);
     Identify(usb, board);
     if (usb.switch_id != kAnySwitch && usb.switch_id != board.switch_id) {
       others += " (" + board.place + " has its switch at " + std::to_string(board.switch_id) + ")";
@@ -255,9 +291,11 @@ OpenBoard FindBoard(const UsbSettings& usb) {
   const std::string name = "board " + BoardName(usb.board) + Wanted(usb);
   if (fitting.size() == 1) return std::move(fitting[0]);
   if (fitting.size() > 1) {
-    throw UsbError(UsbTrouble::kTwoBoards, "more than one " + name + ": at " + fitting[0].place +
-                                               " and " + fitting[1].place +
-                                               "; say which by usb.switch_id or usb.serial");
+    throw UsbError(
+        UsbTrouble::kTwoBoards,
+        "more than one " + name + ": at " + fitting[0].place + " and " + fitting[1].place +
+            "; say which by " +
+            (usb.board == UsbBoardModel::kMouse ? "mouse.serial" : "usb.switch_id or usb.serial"));
   }
   if (!others.empty()) {
     throw UsbError(UsbTrouble::kWrongSwitch, "no " + name + " is there" + others);
@@ -271,6 +309,7 @@ OpenBoard FindBoard(const UsbSettings& usb) {
 }
 
 void SetUpBoard(OpenBoard& board, const UsbSettings& usb, double rest_tension_n, bool first) {
+  if (usb.board == UsbBoardModel::kMouse) return;  // has no counters, and shows nothing until told
   FourStrings rest;
   rest.fill(rest_tension_n);
   const DaDigits digits = StringChannels(usb).Digits(rest);

@@ -89,6 +89,7 @@ std::optional<UsbConflict> FindUsbConflict(const UsbSettings& usb, std::size_t s
 }
 
 std::string BoardName(UsbBoardModel model) {
+  if (model == UsbBoardModel::kMouse) return "SPIDAR-mouse (04D8:003F)";
   return model == UsbBoardModel::kSimple ? "Simple (0CEC:0203)" : "Sh4 (0CEC:0205)";
 }
 

@@ -10,7 +10,12 @@
 
 namespace rikiseki::haptic {
 
-enum class UsbBoardModel { kNone, kSimple, kSh4 };
+enum class UsbBoardModel {
+  kNone,
+  kSimple,
+  kSh4,
+  kMouse  // chosen by device.kind, not by usb.board
+};
 
 inline constexpr int kAnySwitch = -1;
 inline constexpr int kNoEnableBit = -1;
@@ -42,7 +47,7 @@ struct UsbConflict {
 std::optional<UsbConflict> FindUsbConflict(const UsbSettings& usb, std::size_t string_count,
                                            double tension_max_n, double period_us);
 
-/// "Simple (0CEC:0203)", "Sh4 (0CEC:0205)".
+/// "Simple (0CEC:0203)", "Sh4 (0CEC:0205)", "SPIDAR-mouse (04D8:003F)".
 std::string BoardName(UsbBoardModel model);
 
 }  // namespace rikiseki::haptic

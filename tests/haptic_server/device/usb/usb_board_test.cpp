@@ -8,6 +8,7 @@
 
 #include "haptic_server/device/spidar.h"
 #include "haptic_server/device/usb/simple_packets.h"
+#include "tests/usb/emulated_board.h"
 #include "tests/usb/emulated_port.h"
 
 namespace rikiseki::haptic {
