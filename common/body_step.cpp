@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/body_step.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One step of a few rigid bodies with contact planes and Coulomb friction: what a local copy of the
 // haptic side does every tick. The world's engine has its own contact solver; what both must have in
 // common - the kick at the start of the substep, the position rule, how penetration recovers - stands

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Time as the loops see it: nanoseconds of CLOCK_MONOTONIC, or of an experiment's virtual time.
 #pragma once
 

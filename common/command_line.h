@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the command lines of all our programs have in common: --help, --version, and how wrong words end.
 #pragma once
 

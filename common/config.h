@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // INI files with a schema: every key has a type, a range, a unit and a sentence, and every refusal names
 // file, line, key, value and what would be right. Reading is Boost.Program_options', line by line.
 //

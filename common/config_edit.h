@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Changes values in an INI file that people write: what is not changed stays as it is to the byte,
 // comments above all.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the two daemons' mains share: command line, signals, one-line errors with their exit status.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How a program of this project ends; systemd and scripts act on the number (sysexits.h).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The few Eigen names that every room uses. Vectors are in SI units and named by their frame (`p_WB`:
 // position of B in world axes W) wherever it can be mistaken.
 #pragma once

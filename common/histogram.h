@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A log-linear histogram of durations: 8 buckets an octave, 1 us to over an hour, 12 % wide, no
 // allocation. The counts travel in the health streams, so the edges are part of SPEC.md 6.3.
 #pragma once

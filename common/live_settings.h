@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Settings that were read again while the process runs: which of them it takes, and a line in the log for
 // each that changed.
 #pragma once

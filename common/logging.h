@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Log lines of a daemon: through spdlog to stderr, or to the journal where that is what stderr leads to,
 // with their levels. Never from a real-time tick: spdlog formats, allocates and locks in its caller.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One function object of several lambdas: what std::visit chooses from.
 #pragma once
 

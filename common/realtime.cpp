@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/realtime.h"
 
 #include <malloc.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A thread for a loop with deadlines: SCHED_FIFO and locked memory where the machine permits, and the
 // truth about it where not (notes of README, "Real time").
 #pragma once

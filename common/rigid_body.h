@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A rigid body's state and inertia, and how both of our integrators - the local copies of the haptic
 // side and the hooks round the world's engine - move it through one substep.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/service_notice.h"
 
 #include <systemd/sd-daemon.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a daemon tells the service manager that started it: ready, reloading, alive, in words. Through
 // libsystemd's sd_notify; where nobody listens ($NOTIFY_SOCKET is not set) nothing happens.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is done to text in more than one room.
 #pragma once
 

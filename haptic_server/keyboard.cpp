@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/keyboard.h"
 
 #include <poll.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Keys for whoever sits at the device: space or enter = emergency stop, e = enable, c = clutch.
 #pragma once
 

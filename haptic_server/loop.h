@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The haptic loop around its step: wakes at the haptic rate, reads the newest world frame, runs the tick,
 // publishes it. The thread that runs it may be real-time, so nothing below allocates, locks, logs or
 // throws.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_server: owns the force display and closes its force loop at 1 kHz.
 #include <sched.h>
 #include <spdlog/spdlog.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/open_replay.h"
 
 #include <stdexcept>

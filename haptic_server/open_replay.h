@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads the recording that the settings name and makes a device of it.
 #pragma once
 

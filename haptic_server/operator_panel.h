@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What an operator asks for - emergency stop, enable, clutch - on its way from signal handlers and
 // the keyboard into the loop.
 #pragma once

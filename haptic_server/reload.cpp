@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/reload.h"
 
 #include <spdlog/spdlog.h>

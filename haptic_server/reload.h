@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // SIGHUP: reads the settings again and hands what may change to the running loop. A wrong file is refused
 // whole, and what runs goes on.
 #pragma once

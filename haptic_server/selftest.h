@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_server --selftest: whether this PC holds the loop, in words, from what the loop measured of
 // itself, and what to change where it does not.
 #pragma once

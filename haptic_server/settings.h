@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Everything a researcher may tune on the haptic side, with its defaults. settings.cpp gives the keys.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One tick of the haptic loop over plain state: device.read -> feature track -> contact solve ->
 // surface force -> safety -> device.write -> ledger -> local bodies -> message. The
 // clock, the device and the peer are passed in: the daemon drives it with real time, the laboratory

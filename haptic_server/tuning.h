@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What of the settings may change while the loop runs, and how: not at once but over kTuningRampS, so that
 // no change steps the force. The values come from another thread through a slot that never waits.
 #pragma once

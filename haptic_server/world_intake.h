@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What comes from the world in a tick, and what is shown of it: the peer watch decides whether there is a
 // world, its frames go to the ledger (acks), the local copies and the feature track (surfaces).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/attach.h"
 
 #include <pwd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The reading end of somebody else's segment: opens it read-only, checks every word that it will
 // rely on, keeps private copies of them, and never looks at the originals again. SPEC.md 5.3 and
 // section 9.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Packs the messages of messages.h into the bytes of SPEC.md section 6 and back. Only the pointers,
 // channels and planes in use travel, and an optional block only when one of its values differs from
 // its default: a scene pays for what it needs.

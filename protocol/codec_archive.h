@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the encoders and decoders of codec_*.cpp have in common: the archives that walk the fields of
 // fields.h, and the checks of length. Private to them.
 #pragma once

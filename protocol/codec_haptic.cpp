@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Packs and unpacks what the haptic side says: ticks and health. SPEC.md section 6.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Packs and unpacks what observers want to know of the world: its scene and its bodies. SPEC.md section 6.
 #include <algorithm>
 #include <utility>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Packs and unpacks what the world says every tick: frames and health. SPEC.md section 6.
 #include "protocol/codec_archive.h"
 #include "protocol/validate.h"

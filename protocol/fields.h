@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The one list of what travels, in order: the encoder, the decoder, and the layout fingerprint all
 // walk it, so they cannot disagree. Private to the codec and layout.h; SPEC.md section 6 is the
 // same as prose.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sums of impulse units as SPEC.md 7.1 defines them: modulo 2^64, which is defined, unlike the
 // overflow of signed numbers.
 #pragma once

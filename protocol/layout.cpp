@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/layout.h"
 
 #include "protocol/version.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The layout as text, one line a field: "record.field:type:offset:bytes". Its hash stands in every
 // segment header, so that a changed layout under an unchanged version is refused. SPEC.md 8.3.
 #pragma once

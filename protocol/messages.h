@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the streams say: the messages as their reader and writer hold them in memory. codec.h packs
 // them into slots; SPEC.md section 6 gives the bytes. SI units, right-handed world axes W,
 // CLOCK_MONOTONIC ns.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The writing end of a segment: makes it anew, owns it while the process lives, and closes it.
 // Nobody else writes to it or removes it. SPEC.md section 5.
 //

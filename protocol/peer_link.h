@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Keeps a loop attached to its peer, whichever of the two starts first, dies or is replaced. An
 // ordinary thread looks, opens, checks, maps and unmaps; the loop only exchanges pointers with it.
 //

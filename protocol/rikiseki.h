@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 /* rikiseki.h: the Rikiseki protocol in plain C11 (and C++), for whoever writes a peer or looks on.
  *
  * One file, no dependency but libc, POSIX on Linux, and the __atomic builtins of GCC and Clang. It

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/ring.h"
 
 namespace rikiseki::protocol {

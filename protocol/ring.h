@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A ring of messages with one writer and any number of readers, over plain 64-bit words that two
 // processes map. It overwrites the oldest; every message is full state. SPEC.md section 4.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The bytes of a segment: header, stream directory and slot header, as SPEC.md sections 3 and 4
 // give them. Only plain words live here; ring.h and attach.h say how they may be touched.
 #pragma once

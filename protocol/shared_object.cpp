@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/shared_object.h"
 
 #include <fcntl.h>

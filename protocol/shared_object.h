@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A named shared-memory object: open or create it, map it, lock it. The only place that knows
 // Boost.Interprocess and the system calls beside it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A ring and a codec together: messages in, messages out, with the scratch memory inside. Neither
 // allocates after construction; each belongs to one thread.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/validate.h"
 
 #include <cmath>

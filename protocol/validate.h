@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a decoded message must be before anybody acts on it. SPEC.md 6 gives each rule, section 9
 // what a reader does about a breach. Counts were checked before; directions are renormalised in
 // place.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The version of the protocol and the fingerprint of its layout. Whoever edits the layout finds the
 // build broken (layout.cpp) until this file is touched: decide then which number grows, by SPEC.md
 // section 8.

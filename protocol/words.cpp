@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/words.h"
 
 #include <cstring>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The protocol's numbers in words, for people and for keys of reports.
 #pragma once
 

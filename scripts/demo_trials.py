@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs pushes with both daemons and judges them: the body of scripts/demo (standard library only).
 
 The hand of the simulated SPIDAR pushes the block of push.sdf again and again, at whatever phase the world

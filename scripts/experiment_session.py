@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """One participant of the 30 cm task: the body of scripts/experiment (standard library only).
 
 Push the cube once, so that it stops at the mark; with each of the three couplings in turn. The order is balanced over

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # What the scripts share: Debian packages, building. Sourced, not run.
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

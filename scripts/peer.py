@@ -1,4 +1,5 @@
 #!/usr/bin/python3
+# SPDX-License-Identifier: MIT
 """A second implementation of both sides of the Rikiseki protocol, from protocol/SPEC.md alone (its section
 numbers stand in the comments). Python 3 standard library only.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/body_numbers.h"
 
 #include "protocol/messages.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What bodies are called on the wire: a number and a generation, which a body keeps as long as it is
 // the same thing. SPEC.md 6.2-7, 6.2-8.
 #pragma once

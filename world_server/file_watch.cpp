@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/file_watch.h"
 
 #include <sys/stat.h>

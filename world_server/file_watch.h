@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Tells when files have changed, by looking at them now and then: on every file system, through
 // links, and with editors that write beside and rename.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The world loop around its step: wakes at the world rate, drains the haptic side's ledger, steps, and
 // publishes the frame at once (holding a finished one costs a factor 3 in displacement error). An
 // ordinary thread; everything it needs of the real world is here and nothing else.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // world_server: runs a dynamic rigid-body world at 10-60 Hz for a haptic server beside it.
 #include <spdlog/spdlog.h>
 

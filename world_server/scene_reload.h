@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads the scene again beside the running loop - when it is asked to, and when one of the files that
 // the scene was read from has changed - and puts it in the running one's place between two ticks.
 // Reading takes many ticks, and so does letting the engine find what carries what in a large scene: both

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/settings.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One tick of the world loop over plain state: read ledger -> coupling (impulse to bodies) -> physics ->
 // nearest points -> planes -> frame. Messages, time and dynamics are passed in: the daemon drives it with
 // real time, the laboratory with virtual time.

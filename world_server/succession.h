@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What goes on when another scene takes the place of the running one: bodies, where they are and at their
 // velocity, in an engine that has not met them yet.
 #pragma once

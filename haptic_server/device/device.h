@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The force display as the haptic loop sees it: one measurement in, one force out, every tick.
 // Behind it stand SPIDARs (make_device.h, over simulated or real motor boards) and the laboratory's
 // ideal one.

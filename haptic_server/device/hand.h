@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The simulated hand: where it wants to be (a motor program over time) and how it yields to force
 // (a mass-damper-spring about that target). numerics 5; reference scenarios P and H.
 #pragma once

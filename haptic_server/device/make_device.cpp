@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/make_device.h"
 
 #include <stdexcept>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The SPIDAR of the settings: four motors pull at a point, eight at a grip.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Joins device and world: C = s_x R C_device + origin, f_device = s_f R^T f_world. Positions,
 // forces and impulses that leave the process are the world's; what protects device and hand (cap,
 // slew, speed) acts in device units. The device feels the stiffness s_f s_x k_p. numerics 1.

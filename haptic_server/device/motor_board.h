@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The electronics of a SPIDAR: motors that pull with a commanded tension and encoders that count
 // string. Behind it stand the simulated board and, with the USB drivers, the real ones.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A recording as a device: the finger goes where it went, whatever the force. For looking again at what
 // happened, with other settings, another world or another build.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A motor board that is not there, with the physics behind it: strings, their encoders, and the grip
 // as one body with the simulated hand that holds it.
 #pragma once

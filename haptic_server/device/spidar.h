@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A 4-string SPIDAR as a force display: counts -> lengths -> position, force -> tensions, over a
 // motor board. Watches that the strings agree with each other: a slack or slipped one is a fault.
 #pragma once

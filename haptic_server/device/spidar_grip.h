@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An 8-string SPIDAR as a force display, the G6 family: counts -> lengths -> pose of the grip, force
 // without a torque -> tensions, over a motor board. Watches that the strings agree with each other.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // String lengths -> position of the grip, for strings that meet in one point.
 #pragma once
 

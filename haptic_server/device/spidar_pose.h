@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // String lengths -> pose of a grip whose eight strings end at different places of it: the G6
 // family.
 #pragma once

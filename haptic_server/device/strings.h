@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One value for each string of a SPIDAR: what boards, kinematics and tensions have in common.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A wanted force -> the tensions of four strings that pull on one point.
 #pragma once
 

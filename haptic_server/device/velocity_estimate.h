@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How fast something moves, from where it was measured: the backward difference through a first-order
 // filter.
 #pragma once

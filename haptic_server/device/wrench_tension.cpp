@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/wrench_tension.h"
 
 #include <Eigen/Cholesky>

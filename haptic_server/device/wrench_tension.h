@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A wanted force and torque -> the tensions of the eight strings of a grip: the G6 family.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The string that makes a SPIDAR's reading a fault: found in the tick, put into words by another thread.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/guided/calibration.h"
 
 #include <Eigen/Cholesky>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the motors really are, from string lengths alone. Four lengths for three unknowns contradict each
 // other where a motor is not where the model has it: one equation for each place that the grip visits.
 // Turning the whole frame changes no length, so three of the twelve coordinates cannot be known: the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // --calibrate: the grip is held in the middle, then led through the space; the strings' lengths tell where
 // the motors are. The strings are at minimum tension all the while.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A soft spring that holds the grip in the middle of the frame, and carries its weight.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/guided/guarded_device.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A force display with the daemon's safety stage before it, for procedures that command forces without a
 // world: cap, slew limit, over-speed, soft start and emergency stop are those of the force loop.
 #pragma once

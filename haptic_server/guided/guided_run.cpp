@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/guided/guided_run.h"
 
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Guided procedures at the real device, or at the simulated one with a hand that does what is asked: a
 // real-time loop, prompts and results on the terminal, values into the device file.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A procedure that a person goes through at the device - calibration, identification, the search for the
 // largest stiffness - as a step function: the shell (guided_run.h) drives it with real time, tests with
 // virtual time.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What moves with the grip - mass, damping, dry friction - and how late its forces are, from a record of
 // displayed forces and measured positions.
 //

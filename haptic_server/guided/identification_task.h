@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // --identify: the grip, left alone, is shaken by a few newtons on all axes at once, and what moves with it
 // is worked out from how it moved.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/guided/simulated_hands.h"
 
 #include "haptic_server/device/simulated_board.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the prompts of guided procedures ask for, at the simulated device.
 #pragma once
 

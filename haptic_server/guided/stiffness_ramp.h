@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // --z-width: how stiff a wall the device bears with nobody's hand at it. A spring and damper along x hold the
 // grip, left alone; each level of stiffness, 2 % above the one before, gives it a tap, and the first at
 // which the tap does not die away is the limit.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/render/contact_render.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From the finger's place to each body's share of the force: feature track -> contact solve -> surface
 // force, for one pointer, with what the energy meter must know of it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/render/contact_solve.h"
 
 #include <algorithm>

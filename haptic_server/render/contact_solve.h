@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The proxy: the point nearest to the finger that lies outside all planes, exactly, with
 // multipliers that say how much each plane pushes. Paper 3.3; numerics 6.
 #pragma once

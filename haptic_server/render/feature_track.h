@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the world sent becomes what is shown: features keep their identity from frame to frame and
 // move between frames by the display rule. Those of a body with a local copy ride on it: the rule
 // then acts in the body's frame. A ball is shown by the plane that is tangent to it where the finger

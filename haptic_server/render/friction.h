@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Friction of the finger on the bodies that it presses: a stick spring in the tangent plane with a
 // static and a dynamic Coulomb limit. numerics 8.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The books of the impulse: what was really displayed, to which body it belongs, and what the
 // worlds have acknowledged of it. All sums are integers of 1e-12 N s, so they balance exactly.
 // SPEC.md section 7; numerics 1.

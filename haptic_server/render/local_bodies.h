@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Copies of the bodies near the finger, moved by the finger's own force every tick, so that what is
 // felt does not wait for the world. A frame brings the truth up to one of our ticks; from there the
 // copies repeat the ticks since. The world repeats the same ticks by the same rules, so that both

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the stations of the renderer hand to each other: the surfaces that are displayed in a tick,
 // and what each body does to the finger in it.
 #pragma once

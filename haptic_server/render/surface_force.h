@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The spring and damper between the finger and its proxy, shared out over the bodies that push.
 // Paper 3.3; numerics 1.
 #pragma once

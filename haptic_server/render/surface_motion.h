@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How the displayed surfaces that press the finger move from tick to tick, and what work they do by
 // it: the part of a body's motion that the energy meter must not blame. numerics 2.
 #pragma once

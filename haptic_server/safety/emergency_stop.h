@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The latch of the emergency stop: whoever asks for it gets it at once, and it stays until somebody
 // enables again while nobody asks for it and the device's enable input is closed.
 #pragma once

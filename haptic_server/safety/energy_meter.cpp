@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/safety/energy_meter.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The energy meter: what the rendering gives to the hand that no body gave by right (a time-domain
 // passivity observer), against what the device itself dissipates; and from both, whether a contact
 // is unstable. numerics 2. Everything at the device.

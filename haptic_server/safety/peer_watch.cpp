@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/safety/peer_watch.h"
 
 #include <algorithm>

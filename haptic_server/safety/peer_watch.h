@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Is the world alive? Counted on our own clock, from fresh frames, its heartbeat and its owner's
 // word. Absent -> Waiting -> Live -> Late -> Lost -> Absent. SPEC.md section 8.
 #pragma once

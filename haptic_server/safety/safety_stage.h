@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The last stage before the device. It trusts nobody: whatever the stages before computed, the
 // command is finite, within the force cap, within the slew limit, and zero when there is no reason
 // for a force. All forces are those at the device, on the user.

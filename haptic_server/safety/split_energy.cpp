@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/safety/split_energy.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the split between the two processes adds to a contact. A body without a local copy gets the
 // finger's impulse at the next tick of its world, in one kick, while its displayed surface has been
 // moving all along: what the body took with the kick is not what the surface took from the finger.

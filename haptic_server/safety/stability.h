@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What settings can be stable at all: the rules of numerics 2 and 3 in words, for the log at the
 // start and when a world comes. Never in the tick.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_log: records what both daemons publish, tells what a recording holds, and writes its ticks as
 // CSV. An observer: it maps both segments read-only and disturbs nobody.
 #include <signal.h>

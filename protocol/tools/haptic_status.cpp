@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_status: what both daemons are doing, and above all why the force is what it is. An
 // observer: it maps both segments read-only and disturbs nobody.
 #include <unistd.h>

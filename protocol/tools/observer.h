@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A third party that looks at both segments, read-only, and reports what the pair does. Either side
 // may be missing, come and go. Used by haptic_status.
 #pragma once

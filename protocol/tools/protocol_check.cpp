@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // protocol_check: the conformance kit. It takes the place of one side and judges whatever implements the
 // other against SPEC.md, or looks at a live segment.
 #include <algorithm>

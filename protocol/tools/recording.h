@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A recording of a pair of daemons: every message as it stood in the rings, with the epoch of its segment.
 //
 // A file is a header and records, all of 8-byte little-endian words, so that what was written is whole up to

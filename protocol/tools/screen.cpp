@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/screen.h"
 
 #include <sys/ioctl.h>

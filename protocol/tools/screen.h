@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Text on a terminal that is drawn again and again in place: lines that are too long go on below, indented,
 // and what is too tall is cut and says so. Nothing on the terminal is switched that would have to be switched
 // back: who ends the program at any moment keeps a sane terminal, with the last picture above the prompt.

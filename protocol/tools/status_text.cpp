@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/status_text.h"
 
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The report of Observer in words, for people: what `haptic_status` prints without --json.
 #pragma once
 

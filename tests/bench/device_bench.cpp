@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a tick's arithmetic between encoder counts and tensions costs: lengths -> position -> tensions
 // of four strings, lengths -> pose -> tensions of eight; and packets -> counts, tensions -> packets of
 // the two boards on the USB, without the bus. Per tick, p50 and p99 over a grip that moves

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What one haptic tick in contact computes: feature track, contact solve, surface force, safety,
 // ledger, local bodies and the message, without a device's input and output. Per tick, p50 and p99,
 // the clock's own cost taken off:

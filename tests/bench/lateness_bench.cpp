@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How late the haptic loop wakes up, against a bare loop that only sleeps until its deadlines: pairs of
 // runs in turn, so that what else the machine does meets both. The loop should add nothing of its own, and
 // take no page fault once it runs.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What it costs to publish and to read the latest message: this protocol, a bare one-slot seqlock
 // (which a reader of higher priority could hang on: SPEC.md 4.5), and Boost's message_queue.
 // Interleaved runs, median and spread:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How benchmarks time single ticks.
 #pragma once
 

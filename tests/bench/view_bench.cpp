@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the live view costs: pictures per second of 1000 cubes under software rendering, and the lateness of
 // the pair's loops with four clients on the live stream and without, by turns.
 #include <catch2/catch.hpp>

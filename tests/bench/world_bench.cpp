@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the world's queries cost: nearest points of each shape, the features of a mesh of 100 000
 // triangles, and the planes among many bodies. Per query, p50 and p99:
 //

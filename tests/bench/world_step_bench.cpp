@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a tick of the world costs with 10 to 10 000 cubes on a floor, of which the finger pushes one: cost
 // grows with what is near or awake, not with what is there. WorldStep::Tick as a whole, at 20 Hz, the
 // push replayed tick by tick, in ms of CPU per tick:

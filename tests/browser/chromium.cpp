@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/browser/chromium.h"
 
 #include <boost/asio/io_context.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A page in a headless Chromium, driven over the DevTools protocol.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Clients that mean no good: the viewer goes on, serves those that do, and the pair does not notice.
 #include <sys/resource.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/browser/raw_client.h"
 
 #include <arpa/inet.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A TCP client that may be as rude as it likes: what it sends is not looked at.
 #pragma once
 

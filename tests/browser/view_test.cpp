@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live view in headless Chromium against the real pair: what the page shows is what stands in shared
 // memory. Screenshots stay in the artefacts folder of the build.
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/browser/watched_pair.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A pair with its viewer, as the tests of the view start them.
 #pragma once
 

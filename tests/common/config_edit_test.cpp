@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/config_edit.h"
 
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/config.h"
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/live_settings.h"
 
 #include <catch2/catch.hpp>

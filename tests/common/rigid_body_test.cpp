@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "common/rigid_body.h"
 
 #include <catch2/catch.hpp>

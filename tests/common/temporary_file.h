@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A file for one test, removed at its end.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // config/README.md lists every key of both daemons: its value, range and effect, and whether the running
 // loop takes it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bytes -> Decode of each message. What is accepted must be encodable again, and mean the same.
 //
 // Input: u32 which message (modulo their number), u32 blocks, u32 used_bytes, u32 bytes of the

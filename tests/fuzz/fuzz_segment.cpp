@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bytes -> attach -> read, through a real shared-memory object and the shipped Attach. Whatever the
 // object holds: no fault, and what is accepted lies inside it.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Runs a fuzz target over files and folders of files: the kept corpus, or one input that crashed.
 #include <cstddef>
 #include <cstdint>

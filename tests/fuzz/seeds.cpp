@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // fuzz_seeds FOLDER: writes FOLDER/decode and FOLDER/segment, one sound input of every kind, as the
 // targets expect them. Run by hand when the layout changes; fuzzing adds the rest of the corpus.
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads a file of reference rows: `#` lines skipped, then a header, then rows by column name.
 #pragma once
 

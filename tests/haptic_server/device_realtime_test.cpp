@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The devices on the 1 kHz path, and what happens rarely there: nothing is allocated, nothing locked.
 #include <catch2/catch.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/haptic_server/guard.h"
 
 #include <dlfcn.h>

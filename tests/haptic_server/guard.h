@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Counts what a real-time tick must not do: this program's operator new, malloc and pthread_mutex_lock
 // are stood in for by guard.cpp.
 #pragma once

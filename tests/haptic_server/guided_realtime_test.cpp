@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Guided procedures tick on the 1 kHz path like everything else: nothing is allocated, nothing locked.
 #include <catch2/catch.hpp>
 

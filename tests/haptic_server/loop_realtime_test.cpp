@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The whole tick of the shipped loop - peer link, ring, decoding, step, publishing - over real shared
 // memory: it allocates nothing and takes no lock, while a world comes, dies and is replaced.
 #include <unistd.h>

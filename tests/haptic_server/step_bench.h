@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the tests of the step share: one with its device, its clock, and the frames of a world.
 #pragma once
 

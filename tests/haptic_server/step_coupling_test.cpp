@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The step against worlds: the reference scenario, the books, a free body with a copy.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where the step's impulses go and what energy it sees: damping, friction, fades, an unstable contact.
 #include <catch2/catch.hpp>
 #include <cmath>

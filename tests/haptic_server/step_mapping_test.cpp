@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The step behind a mapping between device and world.
 #include <algorithm>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tick allocates nothing and locks nothing, and the guard that counts both would notice.
 #include <catch2/catch.hpp>
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The emergency stop, within the step and down to the strings.
 #include <algorithm>
 #include <array>

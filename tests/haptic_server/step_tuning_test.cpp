@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Settings that change while the loop runs: they lead the force to its new value and never step it.
 #include <catch2/catch.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A force display without faults of its own: the finger is where the test puts it, every force is
 // displayed as commanded. It can be told to fail.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One push of a block on a floor with friction, in one dimension: the experiment of the paper's Fig. 6,
 // through both step functions. Paper section 4; numerics sections 3 and 5.
 #pragma once

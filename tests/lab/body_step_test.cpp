@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The local copies' step (common/body_step.h) against the world's engine: a copy that starts from
 // the engine's settled bodies and contact sites, and never hears of the world again, must end where
 // the engine ends. That is what one contact law on both sides means. numerics section 4.

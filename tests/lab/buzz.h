@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The study of the buzz: a hand on the simulated SPIDAR pushes, pokes, presses and slides over a cube of
 // 20 g, and what of the force lies above 30 Hz is set beside the same touch at a single rate, with the
 // same encoder.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Does the force buzz? The simulated SPIDAR that ships - strings, encoder counts and the hand that holds
 // the grip - against a light cube, with the world at its own rate or, to compare with, at the haptic
 // rate; and what of the force lies above what a hand can do.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One row of a case, for tests: its results by name.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Columns that hold one of a few names.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Both loops in virtual time: the step functions that the daemons ship, with a clock that stands
 // still during a tick, and frames that arrive at once or a stated number of haptic ticks later. The
 // order is that of the written experiments: before haptic tick k, if it is due, the world ticks on

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/coupled_run.h"
 
 #include <catch2/catch.hpp>

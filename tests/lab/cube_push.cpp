@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/cube_push.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One push of a cube through both step functions and the engine that ship, with the world at its own
 // rate or, to compare with, everything at the haptic rate; and the same over the sampling phases of
 // the world.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/engine_error.h"
 
 #include <algorithm>

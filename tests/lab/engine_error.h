@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The engine's own error against its run time, without haptics: what no coupling can mend. numerics
 // section 7.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The engine's own error, as the report shows it.
 #include "tests/lab/engine_error.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How wrong a run of both loops is, and what it costs: five pushes, each against the same push at a
 // single rate (the error of the split alone) and against one that is all but continuous. numerics
 // section 7.

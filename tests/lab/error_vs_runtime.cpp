@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/error_vs_runtime.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a rate, a coupling or a rule costs, and how wrong the result is. numerics section 7.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Error against run time: the figures of the prototypes, what must be so of any error, and that only
 // the times of two runs differ.
 #include "tests/lab/error_vs_runtime.h"

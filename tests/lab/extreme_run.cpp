@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/extreme_run.h"
 
 #include <algorithm>

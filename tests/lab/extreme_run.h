@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One run at the edge of what may happen to the pair: masses, stiffnesses and rates that nobody
 // would choose, fingers that go where no finger goes, samples that are no numbers, a world that
 // falls silent. numerics section 6, "Extremes".

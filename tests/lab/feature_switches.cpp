@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/feature_switches.h"
 
 #include <algorithm>

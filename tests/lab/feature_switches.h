@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The features that a run can do without, and three ways to run it: with the feature in, left out
 // because nothing needs it, and switched out. What is left out must cost what is switched out costs,
 // and move everything alike, to the bit. numerics.md section 6; design decision 11.

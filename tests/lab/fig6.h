@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Fig. 6 of the paper: how far a block goes under one push should not depend on when the world happens
 // to tick. Paper section 4; numerics sections 3 and 5.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/fig6_oracle.h"
 
 #include <algorithm>

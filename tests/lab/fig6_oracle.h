@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The Fig. 6 experiment once more, as plain loops over doubles, from the written order of
 // operations and sharing no code with the project: what the tests hold haptic_lab against.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The gallery: a hand stirs in every scene of config/scenes, and what must hold of any scene holds.
 #pragma once
 

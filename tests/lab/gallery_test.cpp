@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A hand stirs in every scene of the gallery: what must hold of any scene holds, and the same run gives
 // the same bits again, in this process and in others.
 #include "tests/lab/gallery.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The hands of the tables, the device that they hold included.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The program as its users run it: command line, files, exit statuses.
 #include <sys/wait.h>
 

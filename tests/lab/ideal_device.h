@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A force display without strings, motors or encoders: the finger is where the hand is, exactly,
 // and feels the commanded force, exactly, held from tick to tick.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Local copies of jointed bodies against the world's engine: the haptic side, which knows no joints, gets
 // planes that face each other (world_server/features/joint_sites.h). A copy made of one frame, pushed as
 // the engine is and told nothing more, must be where the engine is when the next frames are due.

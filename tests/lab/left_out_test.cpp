@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a scene does not need changes nothing: every feature, on but with nothing to do, gives the same
 // bits as switched out, in both loops, with a hand that presses and strokes. numerics.md section 6.
 #include <catch2/catch.hpp>

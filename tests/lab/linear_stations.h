@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the stations that ship do while a contact lasts, along the contact's normal: every one of
 // them is linear there, so a few differences about a pre-loaded contact tell all. The loops of
 // numerics section 4 are put together from these numbers.

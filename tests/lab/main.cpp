@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_lab: experiments in virtual time with the very step functions that the daemons ship.
 #include <algorithm>
 #include <charconv>

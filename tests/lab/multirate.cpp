@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/multirate.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Two loops of different rates on one object: how fast a deviation grows for a given mass, and which
 // masses are stable. Paper 3; numerics sections 3 and 4.
 #pragma once

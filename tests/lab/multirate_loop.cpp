@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/multirate_loop.h"
 
 #include <Eigen/Eigenvalues>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Finger, haptic loop, frames and slow world as one linear loop: what deviates from a steady push
 // grows or decays by a factor per world period. One dimension, no friction, always in contact.
 // Paper 3; numerics sections 3 and 4.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/multirate_oracle.h"
 
 #include <Eigen/Dense>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The two-rate loops of the reference tables as plain loops over numbers: an independent check of
 // the laboratory, which shares no code with the project. Every tick's force is remembered, replay
 // repeats them one by one, and the period map is read off by running a period from every unit state.

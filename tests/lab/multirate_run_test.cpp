@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The linear loops of multirate against the step functions that ship, with the engine's world: a
 // block that gravity presses against the finger, nudged once it is at rest.
 #include <algorithm>

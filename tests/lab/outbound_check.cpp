@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/outbound_check.h"
 
 #include <algorithm>

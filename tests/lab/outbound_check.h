@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What leaves the two processes, checked as a stranger would: every message must survive the trip
 // through the wire format, whose decoder refuses what is not finite or cannot be.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/planes.h"
 
 #include <Eigen/SVD>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The contact solve alone: a finger and planes in, the nearest point outside all of them out.
 // numerics section 6, "Planes".
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Both loops, ready to tick: what every experiment that watches them tick by tick starts from.
 #pragma once
 

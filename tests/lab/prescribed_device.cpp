@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/prescribed_device.h"
 
 #include <utility>

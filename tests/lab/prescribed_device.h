@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A force display in a hand of infinite impedance: the finger follows its path whatever it feels.
 #pragma once
 

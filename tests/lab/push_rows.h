@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The rows of the study `pushes`: which columns they have, what they mean, and how near `local` must
 // come to its own single-rate run. numerics section 5.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The block pushes of numerics section 5: a 6 cm cube on a floor, and what a finger sphere of 1 cm
 // does to it, however it resists. World axes: x the way of the push, z up, the floor at z = 0.
 #pragma once

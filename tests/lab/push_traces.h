@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How a push of the paper's Fig. 6 goes over time. Paper section 4; fig6.h has its outcome.
 #pragma once
 

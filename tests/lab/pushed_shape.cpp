@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/pushed_shape.h"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What stands on the laboratory's floor to be touched: shapes that all fill a cube of 6 cm along the ways
 // of the finger, so that one script serves them all.
 #pragma once

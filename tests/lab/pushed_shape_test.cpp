@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Shapes other than cubes, light ones too, under a finger with coupling `local`: the copy moves as the
 // world does, and nothing buzzes.
 #include "tests/lab/pushed_shape.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the rows of the study `pushes` say together.
 #pragma once
 

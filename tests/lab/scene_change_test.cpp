@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A scene that changes while a finger is in it, in virtual time: what the change does not speak of
 // feels as if nothing had happened, to the bit; what appears, vanishes or jumps under the finger does
 // not step the force.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/scene_cost.h"
 
 #include <algorithm>

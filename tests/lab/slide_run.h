@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One slide through both step functions and the engine that ship, beside the same slide with the
 // world at the haptic rate: the force, its steps, and whether impulse and energy are all accounted
 // for, whatever lies between device and world.

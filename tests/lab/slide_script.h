@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The written slides: a finger sphere of 1 cm goes at 0.3 m/s over a body that cannot move - round a
 // sphere, off the edge of a box, round that edge - or pushes one that nothing holds.
 #pragma once

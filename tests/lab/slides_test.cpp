@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/slides.h"
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A soft block under the finger in both step functions, in virtual time: the force is that of the two
 // springs in series, at any world rate, latency and coupling, and nothing buzzes.
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/stable_masses.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which masses of the object a two-rate loop holds stable. numerics section 4.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/stir_run.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A hand that stirs in a scene, whatever is in it: to and fro between random places of a box round the
 // middle of the device, pressing, pushing, sliding and lifting what it meets, through both step
 // functions and the engine that ship; then it withdraws until everything is accounted for. What must

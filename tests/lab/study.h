@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A study runs one case over the rows of a table, on several threads, and sets what it computed
 // beside what the table expects. Results do not depend on the number of threads or shards.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/subjects.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Figs. 8 and 9 of the paper with simulated subjects: push a cube once so that it stops at the 30 cm
 // mark, 30 times, and learn from each. Paper section 4; numerics section 5.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Simulated subjects: numerics section 5 has the spread that they must show.
 #include "tests/lab/subjects.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CSV tables with named columns (RFC 4180): what a study reads and writes. Fields that nobody asks
 // about pass through byte by byte. Every refusal is a ConfigError (exit status 78) naming file and
 // line.

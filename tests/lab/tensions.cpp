@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/tensions.h"
 
 #include <Eigen/LU>

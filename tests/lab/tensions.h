@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tension allocation alone: a grip and a wanted force in, four tensions within bounds out.
 // numerics section 6, "SPIDAR".
 #pragma once

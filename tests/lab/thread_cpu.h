@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How long this thread has worked, whatever else the computer does. For studies of cost alone: no
 // result may depend on it.
 #pragma once

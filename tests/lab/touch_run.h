@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A hand touches one body of a scene, strokes it and leaves again: the same touch for any scene, run
 // with features in, left out or switched out, so that motion and cost can be compared.
 #pragma once

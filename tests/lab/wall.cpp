@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/wall.h"
 
 #include <Eigen/Eigenvalues>

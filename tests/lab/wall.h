@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A static wall: how stiff it may be until the sampled loop of device and wall is unstable.
 // numerics section 2.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Both loops in virtual time with nothing but a static wall: solid is x > 0. What the haptic tick
 // displays there is the sampled spring and damper of numerics section 2, and nothing limits it.
 #pragma once

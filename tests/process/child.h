@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A child process of a test: started with an argument list, its stderr kept, killed at the latest when it
 // goes out of scope.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Both daemons and both sides of scripts/peer.py before the conformance kit, strictly.
 #include <catch2/catch.hpp>
 #include <filesystem>

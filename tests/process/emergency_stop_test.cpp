@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The emergency stop of a real haptic_server: by signal and by key, in contact and before there is
 // any; latched, and back through the soft start.
 #include <signal.h>

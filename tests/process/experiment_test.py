@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A session of scripts/experiment with the simulated hand: two trials with each method. Nothing here is timed."""
 
 import argparse

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The simulated hand stirs in the scenes of the gallery between the real daemons: what is promised of
 // every tick holds, nothing flies, and the books balance to the unit.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/process/guided_process.h"
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_server in a guided procedure, with a device file of its own: what it says, and what it saves.
 #pragma once
 

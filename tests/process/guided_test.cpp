@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The guided procedures as a person runs them, on the simulated device: what is found is said, and saved
 // where it belongs.
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Owners that break every rule, against the real daemons: one that truncates its segment under its
 // reader, one that writes noise into it at full speed, one that lies plausibly; a /dev/shm without
 // room; and peers that come and go so often that a leak would show.

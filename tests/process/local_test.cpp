@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Coupling `local` between the real daemons: a block of 20 g, which the other couplings throw about at
 // any of these world rates, is pushed, poked, pressed and slid over without buzzing - beside the same hand
 // and encoder at a single rate, in virtual time. The processes run on a shared machine: margins are wide, and

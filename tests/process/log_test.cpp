@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // haptic_log beside a real pair: every tick is in the recording, over a restart of either side, and all but
 // the last moment is there when the recorder is killed.
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/process/observer.h"
 
 #include <catch2/catch.hpp>

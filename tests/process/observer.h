@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a test sees of a running pair: an observer of both segments that reads every haptic tick and holds
 // it against the promises of the safety stage.
 #pragma once

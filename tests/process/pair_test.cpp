@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Both daemons as separate processes over real shared memory: they couple in either order, deliver what
 // they display, and survive each other's death, each other's sleep and their own restart.
 #include <signal.h>

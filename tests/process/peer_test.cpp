@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // scripts/peer.py, the second implementation, against our daemons and against itself: contact, exact books,
 // and the death of the Python side at a random moment.
 #include <signal.h>

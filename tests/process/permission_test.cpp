@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernel itself keeps each side from writing to the other's segment: shown between two users
 // who share a group, as the two daemons are installed (SPEC.md 5.1), and from a third user outside
 // the group.

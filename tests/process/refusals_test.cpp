@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a user gets wrong is refused before anything starts: exit 78 and one line that names the file, the
 // line, the key or element, and what would be right.
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The scene file is edited while the real pair runs and a finger rests on a wall: what is added, moved or
 // removed elsewhere, a broken file and a restart are nothing to the finger.
 #include <signal.h>

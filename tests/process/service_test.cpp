@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The daemons under a service manager, played by the test: it reads what they send to $NOTIFY_SOCKET, and
 // reloads them by SIGHUP.
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pair in use for long: one side stays while the other is killed and restarted at random, and both
 // are reloaded, with good and with broken settings and scenes. Who stays must not grow - in memory,
 // descriptors, mappings or threads -, the force must keep its limits at every tick, and the books must

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live view of haptic_status as a person sees it: on a terminal of any size each picture has room, the
 // reason of the force is in it, and Ctrl-C leaves the terminal as it was.
 #include <signal.h>

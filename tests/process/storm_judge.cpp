@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/process/storm_judge.h"
 
 #include <algorithm>

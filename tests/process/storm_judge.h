@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What must hold of everything that a StormWatch saw, whoever was killed or stopped at whatever
 // instant. Each function returns one line per violation, at most a few.
 //

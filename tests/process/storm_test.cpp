@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Storms: both real daemons are killed, stopped, continued and restarted at random, in contact, and
 // closed in order at the end. Then the books of everything that was ever published must balance to
 // the unit, the force must have stayed inside its limits at every tick, and the block must not have

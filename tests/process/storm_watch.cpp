@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/process/storm_watch.h"
 
 #include <pthread.h>

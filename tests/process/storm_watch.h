@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The storm's own witness: reads every message of every epoch of both sides from their segments,
 // while their owners come and go, and computes from the haptic ticks alone what was delivered.
 //

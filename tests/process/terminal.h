@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A program on a terminal of its own, as a person at the keyboard has it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Two tiny sides that keep SPEC.md, each a thread with a segment, and for every way to break it a switch:
 // what the conformance kit must let pass, and what it must catch.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the two tiny sides share: a writer and a reader of whole messages that can leave out what makes
 // them safe.
 #pragma once

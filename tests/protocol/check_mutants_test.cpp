@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The conformance kit can fail: a tiny side that keeps SPEC.md passes every case, and for each way to break
 // it the kit names the case.
 #include "tests/protocol/check_mutants.h"

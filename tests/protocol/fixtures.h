@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The messages inside the frozen segments of tests/data/protocol: every field has a value of its
 // own. They are never edited: what was released stays readable. A later version adds functions.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The frozen segments of every version, tests/data/protocol: those of this version attach and
 // decode, those of another major 0 version are refused with the field that differs. SPEC.md 8.2.
 #include <fcntl.h>

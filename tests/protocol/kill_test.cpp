@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Processes that die: what a reader sees when a full-speed writer is killed at any instant.
 #include <sys/wait.h>
 #include <unistd.h>

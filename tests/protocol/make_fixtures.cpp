@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Freezes what this build writes: `protocol_fixtures layout` prints protocol/layout.golden.txt,
 // `protocol_fixtures segments FOLDER` writes haptic-MAJOR.MINOR.bin and world-MAJOR.MINOR.bin,
 // whole segments as a reader finds them. Run by hand once per version; the files of older versions

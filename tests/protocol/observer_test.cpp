@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/observer.h"
 
 #include <sys/wait.h>

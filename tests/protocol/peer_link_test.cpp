@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/peer_link.h"
 
 #include <fcntl.h>

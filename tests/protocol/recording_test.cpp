@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/recording.h"
 
 #include <sys/resource.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 /* The C half of rikiseki_h_test: rikiseki.h compiled as C11. */
 #include "tests/protocol/rikiseki_h_test.h"
 

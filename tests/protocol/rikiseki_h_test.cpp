@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // rikiseki.h and scripts/peer.py against the C++ library: the same layout, the same bytes, the same verdict on
 // nonsense, and segments that either side makes and the other reads.
 #include "tests/protocol/rikiseki_h_test.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 /* What rikiseki_h_test.c offers to the C++ half of the test. */
 #pragma once
 

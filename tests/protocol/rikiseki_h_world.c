@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 /* A whole world side on rikiseki.h alone: the fixed box of SPEC.md section 10 at the origin, 20 Hz. An example
  * to start from, and a test: peer_test.cpp holds haptic_server in contact with it.
  *

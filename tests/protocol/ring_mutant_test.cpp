@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Would the ring's tests notice a broken ring? Every interleaving of one copy with a burst of
 // stores, and every crash point, over the shipped algorithm and over mutants of it.
 #include <pthread.h>

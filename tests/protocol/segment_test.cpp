@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Owner and attach together: the life of a segment within one process, and every kind of hostile
 // shape.
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/stream.h"
 
 #include <atomic>

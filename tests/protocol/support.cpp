@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/protocol/support.h"
 
 #include <sys/wait.h>

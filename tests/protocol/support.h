@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the protocol tests share: random sound messages, private segment names, children to kill.
 #pragma once
 

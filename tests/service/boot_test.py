@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Both daemons as services of a booted systemd, from the installed package: users, scheduling, coupling through shared memory,
 crash, hang, reload, stop and restart in both orders. Usage: boot_test.py BUILD_FOLDER
 """

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A lab PC that is thrown away: the machine's own Debian under a writable layer in memory, the package installed in it by dpkg,
 and a real systemd booted over it (systemd-nspawn).
 

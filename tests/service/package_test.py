@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The Debian package by dpkg itself, on a file system that is thrown away: installs, enables nothing, keeps edited settings
 over an upgrade, goes without a trace; and programs of others build against what it installs. Usage: package_test.py BUILD_FOLDER
 """

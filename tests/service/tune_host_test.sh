@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # scripts/tune_host on a made-up machine: show changes nothing, apply changes what is not as it should be, undo puts back exactly
 # that. Usage: tune_host_test.sh SOURCE_FOLDER
 set -euo pipefail

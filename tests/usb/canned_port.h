@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A port that answers every request at once and always the same, as far as its board answers: what the driver itself costs, and
 // whether it allocates.
 #pragma once

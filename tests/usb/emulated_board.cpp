@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/usb/emulated_board.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The electronics and firmware of a Cyverse board that is not there, byte by byte, with the strings and
 // the hand of haptic_server's simulated board behind it. It reads and writes packets by the published
 // tables on its own: nothing of the driver's packet code is used.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A usb_emulator of a test, and the commands that run daemons on its bus.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What stands behind an emulated bus or port: packets in, answers out.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/usb/emulated_mouse.h"
 
 #include <bit>

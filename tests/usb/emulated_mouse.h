@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The firmware of a SPIDAR-mouse that is not there, byte by byte. It reads reports by the published table
 // on its own: nothing of the driver's packet code is used. What it answers to a request for its state is
 // made up, for nothing is published about it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver's port with an emulated board behind it, in virtual time: what arrives late, arrives by
 // the clock of the ticks.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // usb_emulator: a Cyverse board with strings and a hand behind it, or a SPIDAR-mouse, for the whole,
 // unmodified daemon:
 //

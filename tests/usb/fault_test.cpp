@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What goes wrong on a bus: the daemon does not crash, loses no descriptor, the motors are at zero in
 // time, the reason stands in the health stream, and it takes the board again by itself.
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The guided procedures at an emulated board: they find what is behind it, and leave the motors at zero.
 #include <catch2/catch.hpp>
 #include <sstream>

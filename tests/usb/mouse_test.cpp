@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The whole daemon on an emulated SPIDAR-mouse, real libusb between: the force of a wall reaches the board,
 // a board that comes back goes on, and every way out ends with a stop.
 #include <signal.h>

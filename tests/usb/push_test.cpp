@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pair pushes the block of push.sdf through emulated boards - real processes, real libusb - and it
 // stops where it stops with the simulated device.
 #include <signal.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The ioctls of usbfs; usbfs_plug.cpp has the rest.
 #include "tests/usb/usbfs.h"
 

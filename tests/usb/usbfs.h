@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One USB device at the level of usbfs, on umockdev: the ioctls that libusb makes, the device node,
 // its descriptors in sysfs, plugging in and out. What the bus carries is the business of who makes it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Plugging in and out: the device in sysfs, its node, its descriptors.
 #include <fcntl.h>
 #include <linux/usbdevice_fs.h>

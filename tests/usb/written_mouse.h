@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An ordinary mouse that a test moves: the kernel's events through a pipe with a name.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every scene of config/scenes loads without a warning, is what its comment says, and moves sanely.
 #include <catch2/catch.hpp>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scenes with joints that several tests use.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The world's loop over real shared memory: it leaves a haptic side that died only after it has read and
 // acknowledged everything that it published, whenever in a tick the death happens. SPEC.md 5.3.
 #include "world_server/loop.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Meshes that several tests use.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The thread that reads the scene again: what comes of a changed file, of a broken one, of a request.
 #include "world_server/scene_reload.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A scene that takes another's place while the loop runs: what it says differently changes, everything
 // else goes on, on the wire and in the engine.
 #include <algorithm>

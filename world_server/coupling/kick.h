@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From what the haptic side sent to velocity kicks: the paper's impulses (3.5), or the conventional
 // method's penalty from the sampled finger position (1.2).
 #pragma once

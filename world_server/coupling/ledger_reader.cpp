@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/coupling/ledger_reader.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The world's end of the impulse ledger: turns the cumulative totals of haptic ticks into what each
 // body is owed, and keeps the books of what was applied and what was declared not applied. SPEC.md
 // section 7.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/coupling/replay.h"
 
 #include <algorithm>

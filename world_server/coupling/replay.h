@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // `local`: the world repeats the push as it was displayed, tick by tick, so that it moves as the
 // haptic side's copies did. Substeps as long as a tick only where the finger pushed. numerics 4.
 #pragma once

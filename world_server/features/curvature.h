@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How round a surface is where a finger meets it: what makes a ball better than a plane there.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which feature of this frame is which of the last one, for one finger and one collider: a surface
 // keeps its number while the finger slides along it, however many minima the distance has. And where
 // a point has no one nearest surface - a sphere's centre, a box's middle - the one felt before stays.

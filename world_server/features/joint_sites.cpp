@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/features/joint_sites.h"
 
 #include <algorithm>

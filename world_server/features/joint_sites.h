@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What joints leave of a body, in the words of a local copy, which knows bodies, points and planes alone:
 // a joint is planes that face each other without friction, so that the points between them stay.
 #pragma once

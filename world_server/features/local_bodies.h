@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which bodies the haptic side may move by itself until the next frame, with all they touch or can
 // reach before the frame after next. numerics.md section 4; SPEC.md 6.2.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which bodies a finger could reach: the cheap question before the exact one. What can move is asked
 // one by one (7 ns each, less than a tree of moving things costs to keep up), what cannot move is
 // asked through a tree as soon as there is much of it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Nearest points of triangle meshes, convex hulls among them: a walk down the mesh's tree, exact per
 // triangle, the sign from angle-weighted normals. Inside is where they say so: behind an open mesh
 // too, but not beyond its border.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Signed nearest point and outward normal of every shape: analytic and exact to rounding for the
 // primitives, exact per triangle for hulls and meshes, and right inside as well. The paper's shape
 // feature (section 3.1) is the plane through this point.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Nearest points of the shapes that formulas describe. `p` is in the shape's frame and finite.
 #pragma once
 

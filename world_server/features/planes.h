@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The planes that the haptic side renders: for every finger and every shape near it the tangent
 // plane at the shape's nearest point - of a mesh at each near point - normal towards the finger.
 // Paper 3.1. Of a soft body the plane that the finger does not move (soft_surface.h).

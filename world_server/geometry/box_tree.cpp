@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/geometry/box_tree.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A tree of axis-aligned boxes over things that do not move: triangles of a mesh, fixed colliders of
 // a scene. What is far from a point is never looked at. Boxes stand side by side by fours, in single
 // precision, rounded outward: half the memory to walk through, and four are asked as quickly as one.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/geometry/convex_hull.h"
 
 #include <algorithm>

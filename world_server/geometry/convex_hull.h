@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The convex hull of points, for meshes that move.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A convex body by its flat faces: triangles that lie in one plane are one polygon.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A solid divided into tetrahedra, for bodies that deform: boxes as regular grids, balls and ellipsoids
 // as a rounded grid inside layers that follow the surface, so that no element is cut.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The point of one triangle that is nearest to a point, and on which part of it that lies.
 #pragma once
 

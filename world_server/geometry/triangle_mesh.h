@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A surface of triangles with all that a nearest-point query needs of it, worked out once: which
 // triangles meet at which edge and corner, the angle-weighted normals there (Baerentzen & Aanaes
 // 2005, which alone give the right sign everywhere), a tree of boxes, and in it cones of normals.

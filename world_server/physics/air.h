@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The drag of the air on a body, linear in its speed against the wind.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/box_box_contact.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where two boxes touch or would touch: separating axes, then the incident face clipped against the
 // reference face. Points with a gap belong to it, so that a contact is known before it closes.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/box_faces.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A box in its place, and polygons clipped against its faces: what the contact routines of boxes
 // with boxes, cylinders and hulls share.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/box_plane_contact.h"
 
 namespace rikiseki::world {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a box touches or would touch a half-space: at the corners of its lowest face.
 #pragma once
 

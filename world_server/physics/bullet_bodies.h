@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The scene's bodies as Bullet's: shapes, rigid bodies, and what our own parts of the engine know of each
 // that can move. Built once for a scene; Bullet's user indices say which rigid body is whose:
 //   getUserIndex()  its place among the moving ones, or -1

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Contacts are ours (shape_contact.h) and not Bullet's, for every pair of shapes.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What Bullet's substep lacks, added from outside: the second-order position rule and
 // rotation that keeps the angular momentum. The rules themselves are those of the haptic side's local
 // copies (common/rigid_body.h), so that copy and world agree.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The joints of a scene within Bullet's substep. Bullet's solver has them as rows among the contacts,
 // so that contacts know what the jointed body can do; what it found for the joints is then taken
 // out again, and the linkage (linkage.h) moves the bodies instead, exactly.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Between Eigen and Bullet.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/bullet_rebound.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Restitution after Newton: a contact that was closed at a speed is left at e times that speed. Bullet's
 // own rule asks for the rebound while there is still a gap to cross, takes the crossing off it, and
 // loses the more energy the smaller the step is.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scene shapes as Bullet collision shapes, without the rounding that Bullet's default margins
 // bring.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/bullet_world.h"
 
 #include <algorithm>

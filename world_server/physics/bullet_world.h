@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Rigid bodies on Bullet in double precision, tuned as measured for this project: no margins, split
 // impulse, 50 iterations, one friction direction, our own steps round Bullet's stations
 // (group_substep.h), and hooks that make them accurate (bullet_hooks.h).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the contact solver gave a body in its last substep, read back from Bullet's contacts.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/contact_pairs.h"
 
 #include <algorithm>

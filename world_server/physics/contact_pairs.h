@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pairs of bodies that could meet, each with Bullet's (or our own) contact routine and the contacts
 // that it found. Kept by the bodies' numbers: whatever the addresses, the order is the same. A pair of
 // sleeping bodies keeps its contacts, from whose impulses the solver goes on when they wake.

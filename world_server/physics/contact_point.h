@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A place where two shapes touch or would touch: what every contact routine of this folder finds.
 #pragma once
 

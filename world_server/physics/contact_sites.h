@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // All that a body touches or may soon touch, from the scene's geometry: complete where an engine's
 // manifold is not, gaps included and the support polygon whole. The haptic side's local copies live
 // on these. numerics.md section 4.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where two convex shapes touch or would touch, whatever they are: the direction in which they are
 // furthest apart, and in it all points of the contact at once. Flat faces are clipped against each
 // other, lines beside lines give both ends of what they share, everything else one point.

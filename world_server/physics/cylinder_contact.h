@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a cylinder touches or would touch a box. On a flat face it stands on eight
 // points of its rim that are fixed in it, so that contacts persist while it slides; on its side it
 // lies on the two ends of a line; tilted, on the lowest point of its rim. Points with a gap belong to

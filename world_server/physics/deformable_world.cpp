@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/deformable_world.h"
 
 #include <algorithm>

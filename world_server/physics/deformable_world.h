@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A world in which some bodies deform: the rigid ones as ever, on Bullet, and beside them every soft
 // body by itself, held by the fixed bodies that it touches at the start. Rigid bodies that move and soft
 // ones do not feel each other.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Dynamics as the world loop sees it. Behind it stand Bullet (bullet_world.h), soft bodies beside it
 // (deformable_world.h), and the one-dimensional sliding block of the paper's Fig. 6 (sliding_block.h).
 #pragma once

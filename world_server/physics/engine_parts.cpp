@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/engine_parts.h"
 
 #include "world_server/scene/needs.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The parts of the engine, one by one: what a scene does not need is not in its engine. A part that is
 // left out gives the same bits as one that is in and has nothing to do.
 #pragma once

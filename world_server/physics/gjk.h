@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The nearest points of two convex sets that do not meet, each known by its furthest point along a
 // direction. After E. Gilbert, D. Johnson and S. Keerthi (1988).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One substep of one group: Bullet's own stations, called one by one for the group's bodies alone, with
 // our hooks between them. Bullet's step of a whole world costs 0.5 us for every body that sleeps in it;
 // this costs nothing for who is not in the group.

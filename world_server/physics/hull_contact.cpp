@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/hull_contact.h"
 
 #include <algorithm>

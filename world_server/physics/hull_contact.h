@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a convex hull touches or would touch a half-space or a box: the corners of the face that is
 // turned to the other, clipped to the other's face, all at once; or the one point where two edges
 // meet. Points with a gap belong to it, so that a contact is known before it closes.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Who could meet whom within a short window of time. Bodies that could are one group; groups know nothing
 // of each other until the window has passed, so that each may be stepped alone and in its own steps.
 //

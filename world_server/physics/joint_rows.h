@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The geometry of joints: in which directions one holds two bodies, in which it lets them go, and
 // how far they are apart there.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bullet's solver, with as many sweeps as an island with joints takes: fifty are enough for contacts,
 // but a wagon of 5 kg on wheels of 50 g would creep by 20 um/s where it stands. Friction of what is jointed
 // acts in the directions in which it was aimed (bullet_joints.h), in both.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bodies held together by joints, moved as one: a direct solver of the joints' directions, so that
 // no chain is too long, no mass ratio too large and no pin drifts.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a convex shape touches or would touch a mesh that cannot move: triangle by triangle, but
 // only as the surface has it. An edge or a corner touches where the surface ends in it, so that
 // nothing catches between triangles of a flat or hollow place; and points on one flat place are one

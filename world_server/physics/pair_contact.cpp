@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/pair_contact.h"
 
 #include <btBulletCollisionCommon.h>

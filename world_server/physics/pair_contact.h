@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Puts a routine of ours in the place of Bullet's for a pair of shape types: one that finds all
 // points of a contact at once, before they close, and anew at every substep. Bullet's own find one
 // point per substep, in the overlap, and keep the others at stale places: what slides on a face

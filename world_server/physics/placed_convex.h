@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A convex shape in its place as contact routines see it: a core - a point, a line, a box, ... - with
 // a rounding round it; how far it reaches along a direction, and what of it may touch there.
 #pragma once

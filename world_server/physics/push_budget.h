@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A body takes from the finger no more energy than the finger gave. What the finger meets of a body without
 // a local copy is where it was a period or two ago: it pushes as if the body stood, and a light one
 // would fly off with many times the work that was done on it, which is what makes a slow world unstable

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where two shapes touch or would touch, whatever they are: the one question that the engine and the
 // local copies ask, and which routine answers it.
 #pragma once

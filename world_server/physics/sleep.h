@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Who sleeps. Bodies that touch each other and have all rested for a while fall asleep together, and are
 // stepped no more: they cost nothing until a push, or something awake that is about to touch one of them,
 // wakes them all.

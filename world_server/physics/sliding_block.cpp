@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/sliding_block.h"
 
 #include <cmath>

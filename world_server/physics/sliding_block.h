@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One block that slides along x on a floor with Coulomb friction: the world of the paper's Fig. 6,
 // in closed form per world period, where rigid-body engines would add their own error.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/soft_body.h"
 
 #include <algorithm>

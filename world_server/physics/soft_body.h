@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A solid that deforms: linear-elastic tetrahedra, each in a frame that turns with it (corotational),
 // stepped implicitly, so that any stiffness is stable at any step.
 //

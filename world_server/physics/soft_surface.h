@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The surface of a soft body as a finger meets it: where the planes are, how it gives way, and which
 // nodes take a push. Everything in the body's frame B.
 //

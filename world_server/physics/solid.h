@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A shape with what contact routines ask of it again and again, worked out once.
 #pragma once
 

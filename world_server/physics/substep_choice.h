@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How long the substeps of a group may be: as long as its motion bears, which depends on what it is and
 // does. Figures: the engine's measurements, scaled by size.
 #pragma once

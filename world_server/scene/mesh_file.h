@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Triangles out of a mesh file (STL, OBJ, DAE), through assimp where the build has it.
 #pragma once
 

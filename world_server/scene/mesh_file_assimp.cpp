@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/scene/needs.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a scene needs of the world, and what is left out because it does not. design decision 11.
 //
 // Needed, when some body can move:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A scene as the world runs it: bodies with shapes, masses and surfaces. sdf_loader.h reads it from SDF.
 // Equality is that of the description, to the bit.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a scene that takes another's place changes in it, body by body. A body is known by its name.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the world tells observers of its scene, once per load: names, shapes, places. SPEC.md 6.5.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/scene/sdf_complaints.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What libsdformat dislikes about a file, as one line with its place.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the readers of an SDFormat file share: where an element stands, and how it is refused.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The `<rikiseki:...>` elements of an SDFormat file: what SDF has no word for. SDFormat lets elements
 // with a name space pass unread, so they are checked here to the letter.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/scene/sdf_joint.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The <joint>s of an SDFormat file: which links they make one body, and how they let others move.
 // Fixed ones are no joints to the engine: what they connect becomes one body, or fixed with the world.
 #pragma once

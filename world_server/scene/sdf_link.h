@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What an SDFormat link says of itself without its joints: shapes, mass, air and gravity.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads a scene from an SDFormat world file through libsdformat: what its elements mean in SDF,
 // they mean here. What would change the motion and is not built is refused; what is left unused
 // otherwise (plugins, sensors) is named.

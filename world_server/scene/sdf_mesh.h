@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The <mesh> of a collision: found on this machine, scaled, and made a hull where it moves.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The <surface> of a collision: friction, bounce, and how stiff it feels.
 #pragma once
 

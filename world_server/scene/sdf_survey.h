@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Goes through a parsed SDFormat file and says what of it this world does not do, so that nothing
 // that a file asks for is ignored in silence.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Large files in a third of the time: for every element of a file libsdformat copies all that the
 // format knows to stand in one like it, a camera's lens in each link. What the file has nowhere is left
 // out of that.

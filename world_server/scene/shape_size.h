@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How far a shape reaches: what broad phases and step sizes are made of.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/scene/soft_mesh.h"
 
 #include <Eigen/Eigenvalues>

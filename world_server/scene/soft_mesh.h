@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tetrahedra of a soft body, and which of its nodes the fixed bodies of its scene hold.
 #pragma once
 

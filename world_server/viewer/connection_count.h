@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Counts a connection for as long as it lives.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/viewer/http_answer.h"
 
 #include <arpa/inet.h>

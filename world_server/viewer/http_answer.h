@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the viewer's HTTP answers: the page's files, and the mesh files of the running scene.
 //
 // Whom it answers: a Host header that is an address or localhost, and for the live stream an Origin

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a browser is told: the scene once, then updates. An update is a binary WebSocket message,
 //
 //   u32 bytes of the head | head, JSON, padded by spaces so that what follows lies at a multiple of 8

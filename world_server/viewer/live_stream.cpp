@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/viewer/live_stream.h"
 
 #include <chrono>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live stream to one browser: updates at up to 60 Hz, as many as it takes in.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // world_viewer: serves a live picture of a running pair to browsers. An observer: it maps both
 // segments read-only and disturbs nobody.
 #include <sys/resource.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The page as page/build.mjs bundled it, compiled into the program: nothing is fetched at run time.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/viewer/pair_watch.h"
 
 #include <algorithm>

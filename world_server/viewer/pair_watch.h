@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Looks at both segments, read-only, and keeps what a picture of the pair needs: the haptic ticks of
 // the last seconds, the last frames with the bodies as they were in them, the scene, and both sides'
 // health. Either side may be missing, come and go.

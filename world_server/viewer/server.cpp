@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/viewer/server.h"
 
 #include <boost/beast/core/flat_buffer.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Serves the page and the live stream to any number of browsers up to a limit, from one thread.
 //
 // Never queued without bound: a browser that has not taken in kUpdatesAhead updates gets no further

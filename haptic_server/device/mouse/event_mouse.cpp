@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/mouse/event_mouse.h"
 
 #include <fcntl.h>

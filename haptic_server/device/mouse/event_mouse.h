@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An ordinary mouse, as the kernel's event device gives it: how far it went. A thread of its own opens and
 // closes the device; the tick's thread reads an open one, and hands it back when it is of no use any more.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The reports of the SPIDAR-mouse (04D8:003F, a Microchip HID): numbers to bytes, nothing else. The facts
 // are from SPIDAR-mouse-UNIX and ofxSpidarMouse as noted in public; none was tried on hardware.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Section [mouse] of a device file: which SPIDAR-mouse, which ordinary mouse tells where it is, and what
 // both mean.
 #pragma once

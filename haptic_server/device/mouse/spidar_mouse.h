@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The SPIDAR-mouse as a force display in the plane: four strings pull an ordinary mouse, whose own event
 // device tells where it is. The third axis is always 0, and no force is shown along it.
 //

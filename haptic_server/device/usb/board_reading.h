@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the packets of the Cyverse boards have in common: eight motors, eight counters, one port.
 #pragma once
 

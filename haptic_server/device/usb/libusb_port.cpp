@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/usb/libusb_port.h"
 
 #include <sys/time.h>

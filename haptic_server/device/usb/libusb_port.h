@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The real USB behind the driver. A thread of its own, with libusb contexts of its own, looks for the
 // board, opens and closes it; the tick's thread takes an open one, uses it, and hands it back when it
 // is of no use any more. Two pointers are all that they exchange.

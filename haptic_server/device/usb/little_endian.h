@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The byte order of the Cyverse boards.
 #pragma once
 

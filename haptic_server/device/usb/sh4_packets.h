@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The packets of the Cyverse USB2.0 board "Sh4" (0CEC:0205; SH-4 and FX2): bytes to and from numbers,
 // nothing else. The facts are from Springhead's DRUsb20Sh4 and DRCyUsb20Sh4 as noted in public; none
 // was tried on hardware. Only the base protocol, "update all data", is spoken.

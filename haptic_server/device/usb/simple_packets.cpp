@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/usb/simple_packets.h"
 
 #include <algorithm>

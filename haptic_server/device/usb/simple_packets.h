@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The packets of the Cyverse USB2.0 board "Simple" (0CEC:0203; LDR-SPIDAR-AMP, EZ-USB FX2): bytes to
 // and from numbers, nothing else. All facts are from Springhead's and SpringheadOne's DRUsb20Simple
 // as noted in public; none was tried on hardware.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which channel of a board pulls and counts which string: tensions to D/A digits, counters to counts.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A motor board on the USB: the encoders are asked for, read, and the tensions computed from them are
 // sent in the same tick. What comes is trusted only if its length and, on the Sh4, its echo are right.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One open motor board: its transfers, submitted ahead. Opened and closed by the supervisor's thread,
 // used between by the tick's alone, which is also the only one that handles the events of its libusb
 // context. libusb allocates and locks inside submit and reap; nothing else here does.

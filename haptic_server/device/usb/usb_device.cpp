@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/usb/usb_device.h"
 
 #include "haptic_server/device/make_device.h"

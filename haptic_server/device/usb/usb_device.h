@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The device of the settings where it may be a real one.
 #pragma once
 

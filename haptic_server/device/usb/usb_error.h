@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Why a board cannot be had, for people and for the tick.
 #pragma once
 

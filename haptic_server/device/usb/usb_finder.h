@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Finds the one board on the bus that the settings mean, opens it, and knows it by how it answers.
 // Takes its time: not for the tick.
 #pragma once

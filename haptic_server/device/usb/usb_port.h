@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The pipes of one motor board, as the thread that runs the tick sees them. Behind it stand libusb
 // (libusb_port.h) and, in virtual time, the emulated board of tests/usb. A board may vanish and come
 // back at any time.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Section [usb] of a device file: which board, which of its channels drives which string, and what its
 // digits mean.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a conformance case is: a sentence of SPEC.md, and a script that finds out whether a running
 // peer keeps it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A haptic side under test: its segment, and what it does with a world that is right.
 #include "protocol/tools/check/haptic_cases.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A haptic side under test, with a world that is late, falls silent, dies, closes or starts again: the
 // force goes to zero in the stated time, counted on the haptic side's own clock.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A haptic side under test, with a world that talks nonsense: what it must refuse, and that it goes on.
 #include <atomic>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Judges every message that a haptic side publishes, whatever the kit, as its world, does meanwhile.
 #pragma once
 

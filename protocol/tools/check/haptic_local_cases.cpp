@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A haptic side under test, with planes that say what can move, and with bodies that it may move by
 // itself: SPEC.md 6.2, 7.2-10 and 7.7.
 #include <algorithm>

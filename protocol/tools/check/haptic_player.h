@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kit as a haptic side: one thread that publishes ticks at 1 kHz with totals that it makes up,
 // reads every frame of the world, and can do all of it wrongly when told to.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames that a haptic side must leave alone, and how the kit sees that it does.
 #pragma once
 

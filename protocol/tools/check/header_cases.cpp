@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/check/header_cases.h"
 
 namespace rikiseki::protocol::check {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Headers that no side may accept, whichever is judged: the player offers them, and sees that it is
 // left alone.
 #pragma once

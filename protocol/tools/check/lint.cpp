@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/check/lint.h"
 
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What can be told of a live segment by looking at it: header, directory, ring, liveness. Read-only,
 // of either role.
 #pragma once

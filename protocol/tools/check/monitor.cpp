@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/check/monitor.h"
 
 #include "protocol/tools/check/case.h"

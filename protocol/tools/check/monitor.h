@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sentences that are judged on every message of a run: a monitor counts how often each was put to
 // the test, and keeps the first breach.
 #pragma once

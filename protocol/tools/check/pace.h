@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The time of a player: how it waits for somebody to judge, when it steps, and what the host kept it
 // from meanwhile.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "protocol/tools/check/played_segment.h"
 
 #include <unistd.h>

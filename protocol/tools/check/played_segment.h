@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A segment that the kit owns and may spoil: made like protocol/owner.h makes one, but every word can
 // be written at any time, and it can end in every way that a process can.
 #pragma once

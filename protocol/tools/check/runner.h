@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Runs cases, prints one line for each as it ends, and sums up.
 #pragma once
 

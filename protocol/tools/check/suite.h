@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // All cases of a side, run against one peer.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sums of impulse units as SPEC.md section 7 defines them: modulo 2^64, per channel.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A world under test: its segment, its planes, and what it takes of the impulses of a haptic side that is
 // right.
 #include "protocol/tools/check/world_cases.h"

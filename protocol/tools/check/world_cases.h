@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The cases that judge a world side, in the order in which they run.
 #pragma once
 

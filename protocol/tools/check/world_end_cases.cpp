@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A world under test, with a haptic side that falls silent, closes, dies or starts again: nothing that it
 // displayed is lost, nothing is taken twice, and the world goes on.
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A world under test, with a haptic side that talks nonsense: what it must refuse, and that it goes on.
 #include <atomic>
 #include <cmath>

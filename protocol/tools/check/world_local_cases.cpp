@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A world under test that says what can move, and that sends bodies which the haptic side may move by
 // itself: SPEC.md 6.2 and 7.7.
 #include <algorithm>

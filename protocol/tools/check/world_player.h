@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kit as a world: one thread that publishes frames, reads every tick of the haptic side, keeps the
 // books as SPEC.md 7.4 wants, and can do all of it wrongly when told to.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The geometry of a SPIDAR-G6 (X3): eight motors at the corners of a box, a grip of four crossed
 // arms with two strings each. Half-extents and arms as published (Springhead, HISpidar.cpp; before
 // its turn by -45 degrees, which is none of the strings' business); which corner pulls at which arm

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/replay.h"
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A motor board whose grip the test holds: it reads what the test says, and keeps what it was commanded.
 #pragma once
 

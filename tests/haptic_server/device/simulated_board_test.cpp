@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The physics behind the simulated board, of the grip that eight strings hold. That of the point that
 // four strings pull at is in spidar_test.cpp.
 #include "haptic_server/device/simulated_board.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/device/spidar_grip.h"
 
 #include <algorithm>

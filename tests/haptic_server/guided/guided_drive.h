@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Drives a guided procedure in virtual time.
 #pragma once
 

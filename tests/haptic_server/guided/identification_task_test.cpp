@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/guided/identification_task.h"
 
 #include <catch2/catch.hpp>

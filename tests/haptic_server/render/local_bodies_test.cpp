@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/render/local_bodies.h"
 
 #include <algorithm>

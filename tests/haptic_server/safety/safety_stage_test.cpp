@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "haptic_server/safety/safety_stage.h"
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/report/html.h"
 
 #include "common/text.h"

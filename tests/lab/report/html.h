@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The text of the report's page, part by part. Everything that is passed in as text is escaped.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/report/kept_rows.h"
 
 #include <sys/utsname.h>

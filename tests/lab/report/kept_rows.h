@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The finished rows of a chapter on disk. A report that was stopped goes on from them, and one that
 // was spread over computers is put together from them.
 #pragma once

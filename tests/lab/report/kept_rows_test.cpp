@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Finished rows on disk: what was written is read back to the bit, whatever happened to the file.
 #include "tests/lab/report/kept_rows.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the report is made of: chapters, each a study and the rows that it runs.
 #pragma once
 

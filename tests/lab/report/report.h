@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // `haptic_lab report`: runs the studies of the report, or this shard of them, and writes its page; and
 // `haptic_lab people`, the page of an experiment with people.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The report as a whole, on a few rows of each chapter: it is stopped and goes on, is spread and put
 // together, and gives the same numbers every time.
 #include "tests/lab/report/report.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Runs the report's chapters: what is finished is kept, progress is told, shards are parts of it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The report's sections: each reads finished rows, and says what they say in words, tables and figures.
 // A section whose rows are missing says so.
 #pragma once

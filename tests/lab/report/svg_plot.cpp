@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/lab/report/svg_plot.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A figure for the report's page: axes with units, points and lines, and what diverged, as SVG text.
 // Colours are classes, which the page gives for light and dark.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/features/curvature.h"
 
 #include <catch2/catch.hpp>

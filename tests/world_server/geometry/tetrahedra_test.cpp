@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Solids in tetrahedra: whole, closed, of the right volume, and no element worse than it must be.
 #include "world_server/geometry/tetrahedra.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/geometry/triangle_mesh.h"
 
 #include <catch2/catch.hpp>

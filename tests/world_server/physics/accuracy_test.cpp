@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The engine against closed forms and independent integrations: what the project promises of it.
 #include <array>
 #include <catch2/catch.hpp>

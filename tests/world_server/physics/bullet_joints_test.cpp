@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Jointed bodies in the engine, against closed forms.
 #include "world_server/physics/bullet_joints.h"
 

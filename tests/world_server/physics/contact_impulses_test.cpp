@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What contacts gave a body, as its local copy is told: all of what carries it.
 #include <catch2/catch.hpp>
 #include <vector>

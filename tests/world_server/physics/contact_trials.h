@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What must hold of the contact points of any convex shape with any box.
 #pragma once
 

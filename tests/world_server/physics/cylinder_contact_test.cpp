@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/cylinder_contact.h"
 
 #include <catch2/catch.hpp>

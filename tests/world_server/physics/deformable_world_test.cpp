@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Soft bodies behind the interface of the dynamics: pushes arrive once, and in order.
 #include "world_server/physics/deformable_world.h"
 

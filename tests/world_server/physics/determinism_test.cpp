@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The same scene and the same calls give the same bits: in one process, and in two.
 #include <array>
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cylinders and hulls on half-spaces and boxes in the engine, against closed forms.
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bodies on meshes: a flat mesh of many triangles is a plane, and edges are felt only where the surface
 // ends in them.
 #include "world_server/physics/mesh_contact.h"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Impulses that are said to act somewhere, on bodies that may be elsewhere by then.
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/physics/push_budget.h"
 
 #include <catch2/catch.hpp>

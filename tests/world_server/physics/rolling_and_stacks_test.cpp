@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Round shapes that roll and shapes that stand on each other, in the engine, against closed forms.
 #include <catch2/catch.hpp>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Hulls, meshes, compound bodies, air and rebound in the engine: what the scene says happens.
 #include <catch2/catch.hpp>
 #include <cmath>

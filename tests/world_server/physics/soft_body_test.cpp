@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The mechanics of a soft body against closed forms, and that no step, stiffness or push upsets it.
 #include "world_server/physics/soft_body.h"
 

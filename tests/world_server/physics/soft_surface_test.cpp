@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a finger meets of a soft body: pushes that arrive whole, and a compliance that is the body's.
 #include "world_server/physics/soft_surface.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Worlds as Gazebo's tutorials have people write them load, say what of them is not done, and run.
 #include <algorithm>
 #include <catch2/catch.hpp>

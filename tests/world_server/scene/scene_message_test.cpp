@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "world_server/scene/scene_message.h"
 
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Joints of SDFormat files, as the loader makes scenes of them.
 #include <unistd.h>
 

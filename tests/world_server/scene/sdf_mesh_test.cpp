@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // <mesh> collisions, through the loader.
 #include <unistd.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Soft links in SDF: what is read, and that what cannot be is refused with its place and a way out.
 #include <unistd.h>
 

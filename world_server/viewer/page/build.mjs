@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bundles the page and writes it as a C++ source file: page_files.h says what is in there.
 // usage: node build.mjs FOLDER_WITH_NODE_MODULES OUTPUT.cpp
 import { readFileSync, writeFileSync } from "node:fs";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An ordinary mouse through a pipe with a name: what it went, and what is said where there is none.
 #include "haptic_server/device/mouse/event_mouse.h"
 

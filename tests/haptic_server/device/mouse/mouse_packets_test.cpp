@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every byte of the reports, from the published descriptions and not from our encoders.
 #include "haptic_server/device/mouse/mouse_packets.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Section [mouse] of the shipped device file and what of it is refused.
 #include "haptic_server/device/mouse/mouse_settings.h"
 

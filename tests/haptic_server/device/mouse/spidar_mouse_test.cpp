@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The SPIDAR-mouse over a port with its emulated firmware behind it, moved by an ordinary mouse that the test
 // writes: what it shows is what the board was told, where it is is where the mouse went.
 #include "haptic_server/device/mouse/spidar_mouse.h"

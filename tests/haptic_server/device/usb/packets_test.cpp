@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every byte of both boards' packets, from the published descriptions and not from our encoders; the
 // way of a counter over its wrap.
 #include <catch2/catch.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver over a byte-level port in virtual time: the same hand, the same trace as the simulated
 // device; and what it does when packets are late, short or wrong, and when the board goes and comes.
 #include "haptic_server/device/usb/usb_board.h"

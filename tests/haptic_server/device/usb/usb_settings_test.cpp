@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Section [usb] of the shipped device files and what of it is refused.
 #include "haptic_server/device/usb/usb_settings.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The camera: free (mouse, touch, keys), or following the finger.
 import * as THREE from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";

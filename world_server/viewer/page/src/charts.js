@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Strip charts of the last seconds: one canvas each, per pixel the least and the greatest value, so
 // that no peak is lost between pixels.
 import { POINTER, POINTER_NUMBERS, TICK, TICK_NUMBERS } from "./decode.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live stream: stays connected, whatever restarts, and says after each update that it was taken
 // in. The server sends no more than a few updates ahead of that word.
 import { decodeUpdate } from "./decode.js";

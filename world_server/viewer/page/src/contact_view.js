@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the finger meets: the finger, its proxy on the surface, the contact planes as patches that ride
 // on their bodies, the displayed force, flashes where impulses arrive, ghosts of the local copies.
 import * as THREE from "three";

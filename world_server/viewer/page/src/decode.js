@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads the binary updates that live_message.h describes. Times in ns of the daemons' monotonic
 // clock, which a double holds exactly for a hundred days.
 

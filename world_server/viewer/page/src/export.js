@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Files for the user: the picture, and the ticks of the visible window as CSV.
 import { TICK } from "./decode.js";
 import { WINDOW_NS, lateness } from "./charts.js";

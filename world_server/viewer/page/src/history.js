@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the page remembers: the ticks and the frames of the last 30 s, so that one can pause and step
 // back. Frames of scenes with very many bodies are kept for a shorter time, within MOST_FRAME_BYTES.
 import { BODY, BODY_NUMBERS, POINTER_NUMBERS, TICK, TICK_NUMBERS, bodyKey } from "./decode.js";

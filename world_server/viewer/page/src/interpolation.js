@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where bodies are between two world frames. A cubic through both positions with both velocities,
 // its slopes limited as Fritsch and Carlson do (SIAM J. Numer. Anal. 17, 1980): between the frames no
 // coordinate leaves the range of its two ends, so that a 5 Hz world moves smoothly and never back.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The page: hears the live stream, remembers the last 30 s, draws the moment that the clock says.
 import * as THREE from "three";
 import { Camera } from "./camera.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Colours of the picture, for light and dark; those of the page stand in style.css.
 
 const THEMES = {

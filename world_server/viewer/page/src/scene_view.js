@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The bodies of the scene, instanced: one draw call for all colliders that look alike.
 import * as THREE from "three";
 import { bodyKey } from "./decode.js";

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Geometries of the scene's colliders. Dimensions as SPEC.md 6.5 gives them; z of the collider is up.
 import * as THREE from "three";
 import { ConvexGeometry } from "three/addons/geometries/ConvexGeometry.js";

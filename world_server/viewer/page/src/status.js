@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The banner, which says when and why the force is zero, and the line of facts below the picture.
 
 // Reasons with which the device shows no force, or a fading one, although it might be expected to.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which moment the picture shows. Live, it follows the daemons' clock, behind by as much as
 // interpolation needs: until the frame after has come. Paused, it stands, and can be stepped.
 
