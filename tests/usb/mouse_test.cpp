@@ -116,7 +116,7 @@ TEST_CASE("a SPIDAR-mouse at a wall: what is published is what the board was tol
   CHECK(end.nonsense == 0);
 }
 
-TEST_CASE("--check says which SPIDAR-mouse and which mouse would be used, or why none") {
+TEST_CASE("a check says which SPIDAR-mouse and which mouse would be used, or why none") {
   EmulatedBus bus("spidar4_simple.ini");
   const auto check = [&](const std::string& event) {
     std::string command;
