@@ -285,7 +285,7 @@ struct HapticHealth {
 
 /// Why a world did not apply an impulse.
 enum class DiscardReason : std::uint32_t {
-  kGap = 0,           // beyond the cap after a stall
+  kGap = 0,           // beyond the cap after a stall, or beyond the finger's work
   kCoupling = 1,      // `position` does not use impulses
   kForeignWorld = 2,  // displayed against another world's frame
   kUnknownBody = 3,   // no such body, an old generation, or one that cannot move
