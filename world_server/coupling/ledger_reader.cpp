@@ -89,11 +89,11 @@ void LedgerReader::Discard(const ImpulseUnits& impulse, DiscardReason reason) {
 }
 
 std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::HapticTick& tick,
+                                                                std::uint64_t ticks,
                                                                 double length_s) {
   const std::size_t count = std::min(tick.channel_count, protocol::kMaxChannels);
   std::vector<KnownChannel> present;
   std::vector<Increment> increments;
-  const std::uint64_t ticks = has_baseline_ ? tick.tick - last_tick_ : 1;
   const double held_s = static_cast<double>(ticks) * static_cast<double>(tick.period_ns) * 1e-9;
   Fingers fingers;
   for (const protocol::Pointer& pointer :
@@ -153,7 +153,7 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
                                   : ticks > 1    ? tick.start_ns - last_start_ns_
                                                  : tick.previous_duration_ns;
   const double length_s = static_cast<double>(std::min(length_ns, kLongestTickNs)) * 1e-9;
-  const std::vector<Increment> increments = IncrementsOf(tick, length_s);
+  const std::vector<Increment> increments = IncrementsOf(tick, ticks, length_s);
   if (!has_baseline_) {
     has_baseline_ = true;
     baseline_tick_ = tick.tick;
@@ -240,8 +240,9 @@ void LedgerReader::GiveBack(const Vec3& impulse) {
   ImpulseUnits units{};
   for (std::size_t i = 0; i < units.size(); ++i) {
     const double exact = impulse[static_cast<Eigen::Index>(i)] / protocol::kImpulseUnit;
-    if (std::abs(exact) <= kLargestCountable / protocol::kImpulseUnit)
+    if (std::abs(exact) <= kLargestCountable / protocol::kImpulseUnit) {
       units[i] = std::llround(exact);
+    }
   }
   for (LedgerBooks* books : {&epoch_books_, &life_books_}) {
     books->applied = Minus(books->applied, units);

@@ -57,7 +57,7 @@ struct Replay {
 struct OwedPush {
   PlacedImpulse push;
   double work_j = 0;    // J, that the fingers did against it, up to the newest message
-  double spring_j = 0;  // J, that is in their springs then
+  double spring_j = 0;  // J, that was in their springs, summed over the messages
 };
 
 /// Linear impulse since a baseline.
@@ -135,11 +135,12 @@ class LedgerReader {
     protocol::ImpulseUnits angular_impulse{};
     protocol::ImpulseUnits impulse_before{};  // of it, from epochs before this one
     double work_j = 0;
-    double spring_j = 0;  // as of the newest message
+    double spring_j = 0;
   };
 
-  /// Growth of every channel since the message before, which this one replaces.
-  std::vector<Increment> IncrementsOf(const protocol::HapticTick& tick, double length_s);
+  /// Growth of every channel since the message before, `ticks` ago, which this one replaces.
+  std::vector<Increment> IncrementsOf(const protocol::HapticTick& tick, std::uint64_t ticks,
+                                      double length_s);
   void Discard(const protocol::ImpulseUnits& impulse, protocol::DiscardReason reason);
 
   std::uint64_t own_epoch_;

@@ -17,14 +17,13 @@ class PushBudget {
   /// Of the pushes that come now.
   struct Means {
     double work_j = 0;       // that the fingers did on the body meanwhile
-    double spring_j = 0;     // that is in their springs
+    double spring_j = 0;     // bounds what is kept from before, as their springs held it
     double debt_kept = 1;    // 0..1, of what the body lacks from before
     double overdraft_j = 0;  // that the body may lack; not 0: a kick is charged afterwards
   };
 
-  /// Adds to what is left of the ticks before, of which no more is kept than the springs hold. What lacks must
-  /// be let go of in time: a body that could never be pushed again would sink through the finger. `state` is
-  /// the body's present one.
+  /// Adds to what is kept from before. What lacks must be let go of in time: a body that could never be
+  /// pushed again would sink through the finger. `state` is the body's present one.
   void Grant(const Means& means, const BodyState& state);
 
   /// Scales the kick of a body in `state` to what it may take, 0..1 of it: what a free body gains by it is
