@@ -179,10 +179,6 @@ std::string CompareVersion(std::uint16_t their_major, std::uint16_t their_minor,
                            std::uint64_t their_hash, std::uint16_t our_major,
                            std::uint16_t our_minor, std::uint64_t our_hash) {
   if (their_major != our_major) return Differs("version_major", their_major, our_major);
-  // Under major 0 anything may change from minor to minor, so they must be equal.
-  if (our_major == 0 && their_minor != our_minor) {
-    return Differs("version_minor", their_minor, our_minor);
-  }
   if (their_minor == our_minor && their_hash != our_hash) {
     return "layout_hash is " + Hex(their_hash) + ", this program knows " + Hex(our_hash) +
            " at the same version: the layout was changed without raising it";

@@ -55,8 +55,8 @@
 /* ---------------------------------------------------------------------------------------------
  * Constants */
 
-#define RK_VERSION_MAJOR 0
-#define RK_VERSION_MINOR 4
+#define RK_VERSION_MAJOR 1
+#define RK_VERSION_MINOR 0
 #define RK_LAYOUT_HASH UINT64_C(0xACAE8D32F68C7538) /* 8.3 */
 
 #define RK_MAGIC UINT64_C(0x494B4553494B4952) /* "RIKISEKI" */
@@ -1230,9 +1230,6 @@ static inline int rk_check_header(rk_view* view, uint32_t role) {
   if (h->byte_order != RK_BYTE_ORDER) return rk_refuse(view, "byte_order", h->byte_order);
   if (h->version_major != RK_VERSION_MAJOR) {
     return rk_refuse(view, "version_major", h->version_major);
-  }
-  if (RK_VERSION_MAJOR == 0 && h->version_minor != RK_VERSION_MINOR) {
-    return rk_refuse(view, "version_minor", h->version_minor);
   }
   if (h->version_minor == RK_VERSION_MINOR && h->layout_hash != RK_LAYOUT_HASH) {
     return rk_refuse(view, "at the same version, layout_hash", h->layout_hash);

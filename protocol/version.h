@@ -8,8 +8,8 @@
 
 namespace rikiseki::protocol {
 
-inline constexpr std::uint16_t kVersionMajor = 0;
-inline constexpr std::uint16_t kVersionMinor = 4;
+inline constexpr std::uint16_t kVersionMajor = 1;
+inline constexpr std::uint16_t kVersionMinor = 0;
 
 /// FNV-1a-64 of layout.golden.txt, which layout.h writes. SPEC.md 8.3.
 inline constexpr std::uint64_t kLayoutHash = 0xACAE8D32F68C7538ULL;

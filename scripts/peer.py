@@ -35,7 +35,7 @@ import sys
 import threading
 import time
 
-VERSION = (0, 4)
+VERSION = (1, 0)
 LAYOUT_HASH = 0xACAE8D32F68C7538  # 8.3
 MAGIC = int.from_bytes(b"RIKISEKI", "little")
 BYTE_ORDER = 0x01020304
@@ -834,7 +834,7 @@ def check_header(copy, object_bytes, role):
     require(magic == MAGIC, "magic", hex(magic))
     require(byte_order == BYTE_ORDER, "byte_order", hex(byte_order))
     require(major == VERSION[0], "version_major", major)
-    require(major != 0 or minor == VERSION[1], "version_minor", minor)  # 8.2-2
+    # Of another minor version the directory decides (8.2-4).
     require(minor != VERSION[1] or layout_hash == LAYOUT_HASH, "layout_hash", hex(layout_hash))
     require(header_bytes == HEADER_BYTES, "header_bytes", header_bytes)
     require(its_role == role, "role", its_role)

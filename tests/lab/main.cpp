@@ -22,6 +22,7 @@
 #include "tests/lab/report/report.h"
 #include "tests/lab/scene_cost.h"
 #include "tests/lab/slides.h"
+#include "tests/lab/soft_press.h"
 #include "tests/lab/study.h"
 #include "tests/lab/subjects.h"
 #include "tests/lab/tensions.h"
@@ -36,10 +37,9 @@ constexpr const char* kReport = "report";
 constexpr const char* kPeople = "people";
 
 std::vector<Case> Cases() {
-  return {Buzz(),       EngineError(), ErrorVsRuntime(), Extremes(),        Fig6(),
-          PushTraces(), Subjects(),    Gallery(),        MultirateMasses(), MultirateGrowth(),
-          Planes(),     Pushes(),      SceneCost(),      Slides(),          Tensions(),
-          Wall()};
+  return {Buzz(),      EngineError(), ErrorVsRuntime(),  Extremes(),        Fig6(),   PushTraces(),
+          Subjects(),  Gallery(),     MultirateMasses(), MultirateGrowth(), Planes(), Pushes(),
+          SceneCost(), Slides(),      SoftPresses(),     Tensions(),        Wall()};
 }
 
 struct Options {

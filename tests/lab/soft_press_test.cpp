@@ -4,71 +4,15 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstdlib>
-#include <memory>
 #include <numbers>
 
 #include "haptic_server/device/hand.h"
-#include "tests/lab/coupled_run.h"
 #include "tests/lab/ideal_device.h"
 #include "tests/lab/prescribed_device.h"
-#include "tests/world_server/scenes.h"
-#include "world_server/physics/deformable_world.h"
+#include "tests/lab/soft_press_run.h"
 
 namespace rikiseki::lab {
 namespace {
-
-constexpr double kTop = 0.06;     // m, of the block that stands on the floor
-constexpr double kRadius = 0.01;  // m, of the finger
-
-// 80 x 80 x 60 mm, without weight: its surface is exactly where its box is.
-world::Scene SoftBlock(double youngs_modulus_pa) {
-  world::Scene scene;
-  scene.name = "soft block";
-  scene.gravity.setZero();
-  world::SceneBody block = world::test::Cube(kTop, 0.06, 0.5, {0, 0, kTop / 2});
-  block.colliders[0].shape = world::Box{Vec3(0.04, 0.04, kTop / 2)};
-  block.softness = world::Softness{.youngs_modulus_pa = youngs_modulus_pa, .element_m = 0.015};
-  scene.bodies = {world::test::Floor(0.3), block};
-  return scene;
-}
-
-struct Loops {
-  double rate_hz = 20;
-  double latency_periods = 0;
-  protocol::Coupling coupling = protocol::Coupling::kLocal;
-};
-
-struct Settings {
-  haptic::Settings haptic;
-  world::Settings world;
-};
-
-Settings SettingsOf(const Loops& loops) {
-  Settings settings;
-  settings.world.loop.rate_hz = loops.rate_hz;
-  settings.world.coupling.coupling = loops.coupling;
-  settings.haptic.loop.longest_world_period_ms = 200;
-  return settings;
-}
-
-std::unique_ptr<CoupledRun> Start(const Settings& settings, const Loops& loops,
-                                  const world::Scene& scene, haptic::Device& device) {
-  const auto latency = static_cast<int>(std::lround(loops.latency_periods * 1000 / loops.rate_hz));
-  return std::make_unique<CoupledRun>(settings.haptic, device, settings.world, scene,
-                                      world::MakeDynamics(scene, 1e-3), 0, latency);
-}
-
-double ForceOf(const CoupledRun& run) {
-  return ToVec3(run.haptic_tick().pointers[0].force).norm();
-}
-
-// N/m, of finger and body in series, at a place of the top.
-double Series(const world::Scene& scene, double x, double y, double spring) {
-  const auto dynamics = world::MakeDynamics(scene, 1e-3);
-  const world::SoftSurface::Yield yield =
-      dynamics->FindSoft(1)->YieldAt({x, y, kTop / 2}, Vec3::UnitZ());
-  return 1 / (1 / spring + yield.compliance_m_per_n);
-}
 
 void CheckBooks(const CoupledRun& run) {
   const protocol::Books& books = run.haptic_health().books;
@@ -86,35 +30,19 @@ void CheckBooks(const CoupledRun& run) {
 
 TEST_CASE("a static press gives the force of the two springs in series") {
   for (const double e : {3e3, 8e3, 1e6}) {
-    const world::Scene scene = SoftBlock(e);
     for (const double rate_hz : {10.0, 20.0, 60.0}) {
       for (const double latency : {0.0, 1.0, 2.0}) {
-        const Loops loops{.rate_hz = rate_hz, .latency_periods = latency};
         CAPTURE(e, rate_hz, latency);
-        const Settings settings = SettingsOf(loops);
-        const double series = Series(scene, 0.003, 0.004, settings.haptic.render.stiffness_n_per_m);
-        const double depth = std::min(0.008, 4 / series);
-        const std::int64_t start_ns = CoupledRun::StartNs(settings.haptic);
-        PrescribedDevice finger(
-            [&](double t_s) {
-              const double down = haptic::MinimumJerk((t_s - 0.3) / 0.2);
-              return Vec3(0.003, 0.004, kTop + kRadius + 0.005 - (0.005 + depth) * down);
-            },
-            start_ns);
-        const auto run = Start(settings, loops, scene, finger);
-        double least = 1e9, most = 0;
-        for (int k = 0; k < 1500; ++k) {
-          run->Tick();
-          if (k < 1000) continue;
-          least = std::min(least, ForceOf(*run));
-          most = std::max(most, ForceOf(*run));
-        }
+        const SoftPressed got =
+            RunSoftPress({.youngs_modulus_pa = e,
+                          .force_n = 4,
+                          .loops = {.rate_hz = rate_hz, .latency_periods = latency}},
+                         CheckBooks);
         // The plane of the mesh's unloaded surface and its compliance are exact; what is left is the
         // pad's place, which the nearest point of the dented surface shifts.
-        CHECK(least == Approx(series * depth).epsilon(0.01));
-        CHECK(most == Approx(series * depth).epsilon(0.01));
-        CHECK(run->haptic_health().energy.flagged == 0);
-        CheckBooks(*run);
+        CHECK(got.least_n == Approx(got.expected_n).epsilon(0.01));
+        CHECK(got.most_n == Approx(got.expected_n).epsilon(0.01));
+        CHECK(!got.flagged);
       }
     }
   }
@@ -131,8 +59,8 @@ TEST_CASE("a hand presses, pokes and strokes it, and nothing buzzes") {
         const bool hard = latency == 2.0 && rate_hz < 60;
         if (!full && !hard && (coupling != protocol::Coupling::kLocal || latency == 1)) continue;
         CAPTURE(static_cast<int>(coupling), rate_hz, latency);
-        const Loops loops{rate_hz, latency, coupling};
-        const Settings settings = SettingsOf(loops);
+        const SoftLoops loops{rate_hz, latency, coupling};
+        const haptic::Settings settings = loops.HapticSettings();
         // Three pokes of 60 ms, a press, strokes across the top, and rest.
         const auto program = [](double t_s) {
           const auto in = [&](double at_s, double in_s) {
@@ -143,11 +71,10 @@ TEST_CASE("a hand presses, pokes and strokes it, and nothing buzzes") {
           down += in(1.0, 0.1);
           const double stroke = std::clamp(t_s - 1.3, 0.0, 1.0);
           return Vec3(0.015 * std::sin(4 * std::numbers::pi * stroke), 0.003,
-                      kTop + kRadius + 0.005 - 0.025 * down);
+                      kSoftTop + kSoftFinger + 0.005 - 0.025 * down);
         };
-        IdealDevice hand(haptic::Hand(program, {0.58, 6.7, 135}),
-                         CoupledRun::StartNs(settings.haptic));
-        const auto run = Start(settings, loops, scene, hand);
+        IdealDevice hand(haptic::Hand(program, {0.58, 6.7, 135}), CoupledRun::StartNs(settings));
+        const auto run = StartSoft(settings, loops, scene, hand);
         double most = 0, sum = 0, squares = 0;
         int resting = 0;
         for (int k = 0; k < 4500; ++k) {
@@ -179,18 +106,17 @@ TEST_CASE("a finger that slides over the top and off its edge feels no step") {
   const world::Scene scene = SoftBlock(8e3);
   for (const double rate_hz : {10.0, 20.0, 60.0}) {
     CAPTURE(rate_hz);
-    const Loops loops{.rate_hz = rate_hz, .latency_periods = 0.5};
-    Settings settings = SettingsOf(loops);
-    settings.haptic.render.damping_ns_per_m =
-        0;  // it would show how planes turn, not whether they jump
+    const SoftLoops loops{.rate_hz = rate_hz, .latency_periods = 0.5};
+    haptic::Settings settings = loops.HapticSettings();
+    settings.render.damping_ns_per_m = 0;  // it would show how planes turn, not whether they jump
     PrescribedDevice finger(
         [&](double t_s) {
           const double down = haptic::MinimumJerk((t_s - 0.3) / 0.2);
           return Vec3(-0.03 + 0.05 * std::max(0.0, t_s - 0.6), 0.004,
-                      kTop + kRadius + 0.005 - 0.010 * down);
+                      kSoftTop + kSoftFinger + 0.005 - 0.010 * down);
         },
-        CoupledRun::StartNs(settings.haptic));
-    const auto run = Start(settings, loops, scene, finger);
+        CoupledRun::StartNs(settings));
+    const auto run = StartSoft(settings, loops, scene, finger);
     double last = 0, largest_step = 0, least = 1e9, most = 0;
     for (int k = 0; k < 2600; ++k) {
       run->Tick();

@@ -145,7 +145,7 @@ Table Grid(bool quick) {
   AppendSubjects(table, "medium", 2, 0.05, 16);
   AppendSubjects(table, "firm", 1, 0.05, 16);
   // Paper 5.4: how slow the world may be.
-  for (const double world_period_s : {0.016, 0.1, 0.2}) {
+  for (const double world_period_s : {0.016, 0.033, 0.1, 0.2}) {
     AppendSubjects(table, "medium", 1, world_period_s, 16);
   }
   return table;

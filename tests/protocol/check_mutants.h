@@ -28,6 +28,7 @@ enum class HapticFault {
   kKeepsChannels,  // over a restart of the world
   kTakesNonsense,
   kIgnoresHash,
+  kRefusesMinor,
   kEverySecondTick,
   kBooksAnyAck,
   kNoThreeFrames,
@@ -56,6 +57,7 @@ enum class WorldFault {
   kWaitsForHaptic,  // no frames alone
   kNoSecondLook,
   kIgnoresHash,
+  kRefusesMinor,
   kPublishBeforeWrite,
   kNoClock,       // holds neither stamps nor counters against one
   kSaysFixed,     // of a body that can move

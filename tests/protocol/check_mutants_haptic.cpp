@@ -4,6 +4,7 @@
 #include <map>
 
 #include "protocol/validate.h"
+#include "protocol/version.h"
 #include "tests/protocol/check_mutants.h"
 #include "tests/protocol/check_mutants_common.h"
 
@@ -142,6 +143,10 @@ void Haptic::LookForWorld(std::int64_t now) {
     return;
   }
   if (result.status != AttachStatus::kAttached) return;
+  if (fault == HapticFault::kRefusesMinor && result.view->header().version_minor != kVersionMinor) {
+    refused = result.object;
+    return;
+  }
   raw.reset();
   view = std::move(result.view);
   view_epoch = view->epoch();

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "protocol/version.h"
 #include "tests/protocol/check_mutants.h"
 #include "tests/protocol/check_mutants_common.h"
 
@@ -97,7 +98,12 @@ void World::LookForHaptic() {
       applied = discarded = {};
     }
   }
-  if (result.status == AttachStatus::kAttached) next = std::move(result.view);
+  if (result.status != AttachStatus::kAttached) return;
+  if (fault == WorldFault::kRefusesMinor && result.view->header().version_minor != kVersionMinor) {
+    refused = result.object;
+    return;
+  }
+  next = std::move(result.view);
 }
 
 void World::Take(const HapticTick& tick) {

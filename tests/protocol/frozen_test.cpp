@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The frozen segments of every version, tests/data/protocol: those of this version attach and
-// decode, those of another major 0 version are refused with the field that differs. SPEC.md 8.2.
+// The frozen segments of every version, tests/data/protocol: those of major 1 attach and
+// decode, those from before are refused with the field that differs. SPEC.md 8.2.
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
@@ -68,7 +68,7 @@ void CheckHolds(const PeerView& view, const Message& expected) {
 }
 
 TEST_CASE("a frozen haptic segment of this version attaches and decodes") {
-  const Thawed segment("haptic-0.4.bin", Role::kHaptic);
+  const Thawed segment("haptic-1.0.bin", Role::kHaptic);
   const AttachResult result = AttachTo(segment, Role::kHaptic);
   INFO(result.text);
   REQUIRE(result.status == AttachStatus::kAttached);
@@ -78,7 +78,7 @@ TEST_CASE("a frozen haptic segment of this version attaches and decodes") {
 }
 
 TEST_CASE("a frozen world segment of this version attaches and decodes") {
-  const Thawed segment("world-0.4.bin", Role::kWorld);
+  const Thawed segment("world-1.0.bin", Role::kWorld);
   const AttachResult result = AttachTo(segment, Role::kWorld);
   INFO(result.text);
   REQUIRE(result.status == AttachStatus::kAttached);
@@ -99,14 +99,13 @@ TEST_CASE("a frozen world segment of this version attaches and decodes") {
   CHECK(packed(scenes.scene()) == packed(test::FixtureScene()));
 }
 
-TEST_CASE("older segments are refused: under major 0 the minor version must be equal") {
-  for (const char* minor : {"1", "2", "3"}) {
+TEST_CASE("segments from before 1.0 are refused") {
+  for (const char* minor : {"1", "2", "3", "4"}) {
     for (const Role role : {Role::kHaptic, Role::kWorld}) {
       const Thawed segment(std::string(RoleName(role)) + "-0." + minor + ".bin", role);
       const AttachResult result = AttachTo(segment, role);
       CHECK(result.status == AttachStatus::kIncompatible);
-      CHECK_THAT(result.text, Catch::Contains(std::string("version_minor is ") + minor +
-                                              ", this program knows 4"));
+      CHECK_THAT(result.text, Catch::Contains("version_major is 0, this program knows 1"));
     }
   }
 }

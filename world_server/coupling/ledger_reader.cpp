@@ -122,6 +122,7 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
     }  // else it is part of the baseline, or its history is unknown: it counts from here
     const ImpulseUnits impulse = Minus(now.impulse, before.impulse);
     if (held_s > 0) now.force = InSi(impulse) / held_s;
+    if (tick.stiffness > 0) now.spring_j = 0.5 * now.force.squaredNorm() / tick.stiffness;
     double work_j = 0;
     if (now.pointer < fingers.size() && fingers[now.pointer] && fingers_[now.pointer]) {
       // What was lost between the two is in the sum of this one.
@@ -138,8 +139,7 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
          .angular_first_moment = now.angular_first_moment - before.angular_first_moment -
                                  length_s * InSi(before.angular_impulse),
          .point = ToVec3(channel.contact_point),
-         .work_j = work_j,
-         .spring_j = tick.stiffness > 0 ? 0.5 * now.force.squaredNorm() / tick.stiffness : 0});
+         .work_j = work_j});
   }
   known_ = std::move(present);
   fingers_ = fingers;
@@ -196,7 +196,6 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
       owed.impulse = Plus(owed.impulse, increment.impulse);
       owed.angular_impulse = Plus(owed.angular_impulse, increment.angular_impulse);
       owed.work_j += increment.work_j;
-      owed.spring_j += increment.spring_j;
       const bool nothing =
           increment.impulse == ImpulseUnits{} && increment.angular_impulse == ImpulseUnits{};
       if (!replays || nothing) continue;
@@ -228,6 +227,11 @@ std::span<const OwedPush> LedgerReader::Take() {
   }
   life_books_.applied = Plus(life_books_.applied, sum);
   epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, sum_before));
+  for (const KnownChannel& held : known_) {
+    if (held.body < bodies_.size() && held.generation == bodies_[held.body].generation) {
+      owed_[held.body].spring_j += held.spring_j;
+    }
+  }
   consumed_ns_ = consumed_nms_ = 0;
   std::swap(taken_replay_, replay_);
   for (ReplayImpulse& push : taken_replay_.impulses) push.body = bodies_[push.body].place;

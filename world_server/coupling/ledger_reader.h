@@ -57,7 +57,7 @@ struct Replay {
 struct OwedPush {
   PlacedImpulse push;
   double work_j = 0;    // J, that the fingers did against it, up to the newest message
-  double spring_j = 0;  // J, that was in their springs, summed over the messages
+  double spring_j = 0;  // J, that their springs held before, when Take() was called last
 };
 
 /// Linear impulse since a baseline.
@@ -117,6 +117,7 @@ class LedgerReader {
     Vec3 first_moment = Vec3::Zero();
     Vec3 angular_first_moment = Vec3::Zero();
     Vec3 force = Vec3::Zero();  // N, on the body, held since
+    double spring_j = 0;        // J, of the finger
 
     bool Is(const protocol::Channel& channel) const;
   };
@@ -128,7 +129,6 @@ class LedgerReader {
     Vec3 angular_first_moment = Vec3::Zero();
     Vec3 point = Vec3::Zero();  // m, of the latest contact
     double work_j = 0;          // that the finger did since the message before
-    double spring_j = 0;        // in its spring now
   };
   struct OwedUnits {
     protocol::ImpulseUnits impulse{};

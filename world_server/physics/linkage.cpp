@@ -104,6 +104,7 @@ std::vector<Linkage> Linkage::Of(const Scene& scene) {
   std::vector<std::size_t> place(scene.bodies.size(), Joint::kWorld);       // within its linkage
   std::vector<std::size_t> linkage_of(scene.bodies.size(), Joint::kWorld);  // of a root
   for (const Joint& joint : scene.joints) {
+    if (!moves(joint.parent) && !moves(joint.child)) continue;  // it holds what is held anyway
     for (const std::size_t body : {joint.parent, joint.child}) {
       if (!moves(body) || place[body] != Joint::kWorld) continue;
       std::size_t& own = linkage_of[find(body)];

@@ -17,7 +17,7 @@ class PushBudget {
   /// Of the pushes that come now.
   struct Means {
     double work_j = 0;       // that the fingers did on the body meanwhile
-    double spring_j = 0;     // bounds what is kept from before, as their springs held it
+    double spring_j = 0;     // bounds what is kept from before: no more was in their springs then
     double debt_kept = 1;    // 0..1, of what the body lacks from before
     double overdraft_j = 0;  // that the body may lack; not 0: a kick is charged afterwards
   };

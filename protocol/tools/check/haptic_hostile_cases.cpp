@@ -321,8 +321,8 @@ constexpr HapticCase kCases[] = {
     {"haptic/8.2-7/unknown-blocks", UnknownBlocks},
     {"haptic/6.1-1/flood", Flood},
     {"haptic/8.2-1/major", RefusesMajor},
-    {"haptic/8.2-2/minor", RefusesMinor},
     {"haptic/8.2-3/hash", RefusesHash},
+    {"haptic/8.2-4/minor", TakesMinor},
     {"haptic/5.2-9/initialising", WaitsForReady},
     {"haptic/9.1-1/wrong-headers", RefusesWrongHeaders},
 };

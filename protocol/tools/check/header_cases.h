@@ -8,7 +8,6 @@
 
 #include "protocol/segment.h"
 #include "protocol/tools/check/case.h"
-#include "protocol/version.h"
 
 namespace rikiseki::protocol::check {
 
@@ -32,12 +31,17 @@ void RefusesMajor(Player& player) {
       player, [](SegmentHeader& header) { ++header.version_major; }, "version_major differs");
 }
 
+// A later minor version appends, and so its layout is another.
 template <typename Player>
-void RefusesMinor(Player& player) {
-  if (kVersionMajor != 0) Unimplemented("from 1.0 on minor versions may differ");
-  RefusesVersion(
-      player, [](SegmentHeader& header) { ++header.version_minor; },
-      "version_minor differs under major 0");
+void TakesMinor(Player& player) {
+  player.Leave();
+  player.Open(
+      [](SegmentHeader& header) {
+        ++header.version_minor;
+        header.layout_hash ^= 1;
+      },
+      SegmentState::kReady);
+  player.Couple();
 }
 
 template <typename Player>

@@ -323,8 +323,8 @@ constexpr WorldCase kCases[] = {
     {"world/8.2-7/unknown-blocks", UnknownBlocks},
     {"world/6.2-1/flood", Flood},
     {"world/8.2-1/major", RefusesMajor},
-    {"world/8.2-2/minor", RefusesMinor},
     {"world/8.2-3/hash", RefusesHash},
+    {"world/8.2-4/minor", TakesMinor},
     {"world/5.2-9/initialising", WaitsForReady},
     {"world/9.1-1/wrong-headers", RefusesWrongHeaders},
 };

@@ -21,15 +21,109 @@ const ResultRow* FindRow(const std::vector<ResultRow>& rows,
   return nullptr;
 }
 
+// How far a rule is from what the loop holds, in percent.
+struct RuleError {
+  double most_above = 0;
+  double most_below = 0;
+
+  void Add(double rule, double holds) {
+    most_above = std::max(most_above, 100 * (rule / holds - 1));
+    most_below = std::max(most_below, 100 * (1 - rule / holds));
+  }
+};
+
+// Rules of thumb against all walls without delay; those with light damping, (b + B) T/m < 0.2, by themselves.
+void AnswerByRule(const Results& results, Html& page) {
+  RuleError curved, curved_light, linear, linear_light;
+  std::size_t walls = 0;
+  for (const char* chapter : {"wall", "any-wall"}) {
+    for (const ResultRow& row : RowsOf(results, chapter)) {
+      const double holds = row.Got("kappa=Kmax*T^2/m");
+      if (row.Text("delay_samples") != "0" || !(holds > 0)) continue;
+      const double beta =
+          (row.Number("b_Ns_m") + row.Number("B_Ns_m")) * row.Number("T_s") / row.Number("m_kg");
+      const double curve = std::max(0.0, 2 * beta * (2 - beta) / (2 + beta));
+      ++walls;
+      curved.Add(curve, holds);
+      linear.Add(2 * beta, holds);
+      if (beta >= 0.2) continue;
+      curved_light.Add(curve, holds);
+      linear_light.Add(2 * beta, holds);
+    }
+  }
+  page.Paragraph("Two rules, held against the " + std::to_string(walls) +
+                 " walls here without delay. K = (m/T^2) 2 beta (2 - beta)/(2 + beta), beta = (b + "
+                 "B) T/m, is exact for b = 0, at most " +
+                 Short(curved.most_above) + " % too high anywhere, and at most " +
+                 Short(curved_light.most_below) + " % too low where beta < 0.2 (" +
+                 Short(curved.most_below) +
+                 " % anywhere: it takes the device's own damping for rendered). The linear rule of "
+                 "Gil and Hulin, K = (b + B)/(T/2 + d T), is at "
+                 "most " +
+                 Short(linear_light.most_above) + " % too high where beta < 0.2, but " +
+                 Short(linear.most_above) +
+                 " % beyond. Rendered damping alone gets nothing above 0.686 m/T^2; 0.1445, "
+                 "0.0624, 0.0348 m/T^2 with 1, 2, 3 ticks of delay.");
+}
+
+// One table for every device, and how far rules of thumb may be trusted.
+void AnswerAnyDevice(const Results& results, Html& page) {
+  const std::vector<ResultRow>& rows = RowsOf(results, "any-wall");
+  if (rows.empty()) return;
+  page.Paragraph(
+      "For your own device compute b T/m and B T/m, look up the number, and multiply by m/T^2: "
+      "that is the stiffness in N/m "
+      "(between the lines take the smaller one). More damping of the wall is not always better: "
+      "past B T/m of about 0.8 it "
+      "falls again, with a tick of delay past 0.3.");
+  const auto all = [&](const char* column) {
+    std::vector<double> values;
+    for (const ResultRow& row : rows) {
+      const double value = row.Number(column);
+      if (std::find(values.begin(), values.end(), value) == values.end()) values.push_back(value);
+    }
+    return values;
+  };
+  const std::vector<double> device_dampings = all("b_Ns_m");
+  const std::vector<double> wall_dampings = all("B_Ns_m");
+  std::vector<std::string> header = {"K T^2/m"};
+  for (const double wall : wall_dampings) header.push_back("B T/m = " + Short(1e-3 * wall));
+  std::vector<std::vector<std::string>> lines;
+  for (const auto& [delay, said] :
+       {std::pair("0", ""), std::pair("1", ", a tick late"), std::pair("2", ", two ticks late")}) {
+    for (const double device : device_dampings) {
+      std::vector<std::string> line = {"b T/m = " + Short(1e-3 * device) + said};
+      for (const double wall : wall_dampings) {
+        const ResultRow* row = FindRow(
+            rows,
+            {{"b_Ns_m", ToField(device)}, {"B_Ns_m", ToField(wall)}, {"delay_samples", delay}});
+        const double largest = row == nullptr ? 0 : row->Got("kappa=Kmax*T^2/m");
+        line.push_back(largest > 0 ? Short(largest) : "none");
+      }
+      lines.push_back(line);
+    }
+  }
+  page.Table(header, lines);
+
+  AnswerByRule(results, page);
+  page.Paragraph(
+      "To the last digit: haptic_lab wall --cases mine.csv, with the columns T_s, m_kg, b_Ns_m, "
+      "B_Ns_m, delay_samples. What the "
+      "device feels is the stiffness of the config times motion scale times force scale: that is "
+      "what must stay below.");
+  Repeat("wall", "any-wall", rows, page);
+}
+
 void AnswerStiffness(const Results& results, Html& page) {
   page.Subheading("Which stiffness is stable on my device at my rate?");
   page.Paragraph(
-      "Take the identified mass m and damping b of your device (haptic_server --selftest names "
-      "what "
-      "the settings say), the damping B that you render and the delay d in ticks. A wall is stable "
-      "below K = (b + B)/(T/2 + d T), and never above 0.686 m/T^2, whatever B is; with 1, 2, 3 "
-      "ticks of "
-      "delay 0.1445, 0.0624, 0.0348. What the loop that ships holds, in N/m:");
+      "Take the identified mass m [kg] and damping b [Ns/m] of your device (haptic_server "
+      "--selftest names "
+      "what the settings say; a hand that holds it adds its own to both), the damping B [Ns/m] "
+      "that you render, "
+      "the period T [s] and the delay d in ticks (0: read, computed and written in the same tick). "
+      "What the loop that "
+      "ships holds, in N/m:");
   const std::vector<ResultRow>& rows = RowsOf(results, "wall");
   std::vector<std::vector<std::string>> lines;
   for (const auto& [mass, damping, name] :
@@ -39,26 +133,22 @@ void AnswerStiffness(const Results& results, Html& page) {
       std::vector<std::string> line = {std::string(name) + " (" + mass + " kg, " + damping +
                                        " Ns/m), B = " + wall_damping + " Ns/m"};
       for (const double period_s : {4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4}) {
-        const ResultRow* row = FindRow(rows, {{"m_kg", mass},
-                                              {"b_Ns_m", damping},
-                                              {"B_Ns_m", wall_damping},
-                                              {"delay_samples", "0"},
-                                              {"T_s", ToField(period_s)}});
-        line.push_back(row == nullptr ? "" : Value(row->Got("Kmax_eig_N_m")));
+        for (const char* delay : {"0", "1"}) {
+          const ResultRow* row = FindRow(rows, {{"m_kg", mass},
+                                                {"b_Ns_m", damping},
+                                                {"B_Ns_m", wall_damping},
+                                                {"delay_samples", delay},
+                                                {"T_s", ToField(period_s)}});
+          line.push_back(row == nullptr ? "" : Value(row->Got("Kmax_eig_N_m")));
+        }
       }
       lines.push_back(line);
     }
   }
-  page.Table({"", "250 Hz", "500 Hz", "1 kHz", "2 kHz", "4 kHz"}, lines);
-  page.Paragraph(
-      "For your own: haptic_lab wall --cases mine.csv with the columns T_s, m_kg, b_Ns_m, B_Ns_m, "
-      "delay_samples.");
-}
-
-std::string StableMasses(const ResultRow* row) {
-  if (row == nullptr) return "";
-  const auto text = row->texts.find("stable_intervals_kg_in_1e-5..1e4");
-  return text == row->texts.end() || text->second.empty() ? "none" : text->second;
+  page.Table({"", "250 Hz", "a tick late", "500 Hz", "a tick late", "1 kHz", "a tick late", "2 kHz",
+              "a tick late", "4 kHz", "a tick late"},
+             lines);
+  AnswerAnyDevice(results, page);
 }
 
 void AnswerMass(const Results& results, Html& page) {
@@ -77,11 +167,12 @@ void AnswerMass(const Results& results, Html& page) {
       std::vector<std::string> line = {Short(1 / std::strtod(world_period, nullptr)) + " Hz, " +
                                        hand + " hand"};
       for (const char* method : {"conv", "impulse_interp", "local_AUTH"}) {
-        line.push_back(StableMasses(FindRow(rows, {{"Tw_s", world_period},
-                                                   {"hand", hand},
-                                                   {"method", method},
-                                                   {"kp_N_m", "2000"},
-                                                   {"T_s", "0.001"}})));
+        const ResultRow* row = FindRow(rows, {{"Tw_s", world_period},
+                                              {"hand", hand},
+                                              {"method", method},
+                                              {"kp_N_m", "2000"},
+                                              {"T_s", "0.001"}});
+        line.push_back(row == nullptr ? "" : StableMasses(*row));
       }
       lines.push_back(line);
     }
@@ -179,16 +270,6 @@ void AnswerFasterLoop(const Results& results, Html& page) {
 }
 
 }  // namespace
-
-const std::vector<ResultRow>& RowsOf(const Results& results, const std::string& chapter) {
-  static const std::vector<ResultRow> none;
-  const auto found = results.find(chapter);
-  return found == results.end() ? none : found->second;
-}
-
-std::string Value(double value, const std::string& unit) {
-  return std::isfinite(value) ? Short(value) + unit : "diverged";
-}
 
 void WriteAnswers(const Results& results, Html& page) {
   page.Heading("Four answers", "answers");

@@ -252,7 +252,7 @@ void WriteEngine(const std::vector<ResultRow>& rows, Html& page) {
          Short(Cpu(row)) + " %"});
   }
   page.Table({"scenario", "substep", "error", "CPU of a core"}, lines);
-  page.Command("haptic_lab engine-error --cases engine-error.csv --out again.csv");
+  Repeat("engine-error", "engine-error", rows, page);
 }
 
 }  // namespace
@@ -312,7 +312,7 @@ void WriteError(const Results& results, Html& page) {
               "its SD mm", "impulse N s", "force RMS N", "injected mJ", "jump mm", "CPU %",
               "tick us p50", "p99.9"},
              lines);
-  page.Command("haptic_lab error-vs-runtime --cases error-vs-runtime.csv --out again.csv");
+  Repeat("error-vs-runtime", "error-vs-runtime", rows, page);
   if (const auto& engine = RowsOf(results, "engine-error"); !engine.empty()) {
     WriteEngine(engine, page);
   }

@@ -81,8 +81,9 @@ void Html::Figures(const std::vector<Plot>& plots) {
   out_ << "</div>\n";
 }
 
-void Html::Command(const std::string& text) {
-  out_ << "<p class=\"command\">Repeat with <code>" << Escaped(text) << "</code></p>\n";
+void Html::Command(const std::string& text, const std::string& machines) {
+  out_ << "<p class=\"command\">Repeat with <code>" << Escaped(text) << "</code>"
+       << (machines.empty() ? "" : "; run on " + Escaped(machines)) << "</p>\n";
 }
 
 std::string Html::Page(const std::string& title) const {

@@ -22,8 +22,8 @@ class Html {
   void Table(const std::vector<std::string>& header,
              const std::vector<std::vector<std::string>>& rows);
   void Figures(const std::vector<Plot>& plots);
-  /// The command that repeats what stands above.
-  void Command(const std::string& text);
+  /// The command that repeats what stands above, and the computers that it ran on.
+  void Command(const std::string& text, const std::string& machines = "");
 
   /// The whole page around these parts, with everything it needs in itself.
   std::string Page(const std::string& title) const;

@@ -80,7 +80,7 @@ void WriteFig6(const std::vector<ResultRow>& rows, Html& page) {
       "object is displayed as if it could not move, so it is pushed too far, by about ((M + "
       "m)/M)^2, "
       "in every phase alike. Local has neither error.");
-  page.Command("haptic_lab fig6-traces --cases fig6-traces.csv --out again.csv");
+  Repeat("fig6-traces", "fig6-traces", rows, page);
 }
 
 std::vector<std::array<std::string, 3>> Settings(const std::vector<ResultRow>& rows) {
@@ -162,43 +162,7 @@ void WriteFig9(const std::vector<ResultRow>& rows, Html& page) {
       "motion "
       "computed in the haptic process improved the feel at low world rates, without figures; the "
       "columns impulse and local are those figures for this task.");
-  page.Command("haptic_lab fig9 --cases fig9.csv --out again.csv");
-}
-
-void WriteRemarks(const Results& results, Html& page) {
-  page.Subheading("Remarks of section 5");
-  std::vector<std::string> items;
-  // 5.2: 10 Hz.
-  for (const char* coupling : {"impulse", "local"}) {
-    for (const ResultRow& row : RowsOf(results, "error-vs-runtime")) {
-      if (row.Text("system") != "H" || row.Text("coupling") != coupling ||
-          row.Number("Tw_s") != 0.1 || row.Number("T_s") != 1e-3 || row.Text("display") == "hold" ||
-          row.Text("display") == "extrapolate" || row.Text("body_step") == "semi_implicit") {
-        continue;
-      }
-      items.push_back(
-          std::string("5.2, a world at 10 Hz with ") + coupling + ": the 2 kg block of H ends " +
-          Value(1e3 * row.Got("continuous_rms_m"), " mm") +
-          " off, the largest step of the force is " + Value(row.Got("force_step_n"), " N") +
-          ". The paper: touching still feels natural, the picture stutters.");
-    }
-  }
-  items.emplace_back(
-      "5.3, friction: that the velocity of a displayed plane is not that of the object holds here "
-      "by "
-      "construction - frames carry the object's velocity, and friction is against it. haptic_lab "
-      "slides "
-      "measures it: round a sphere the force error is 0.00 N at every world rate.");
-  items.emplace_back(
-      "5.4, levels of splitting: the table of Figs. 8 and 9 and the section on error against run "
-      "time "
-      "hold `impulse` and `local` at world rates from 60 to 5 Hz.");
-  items.emplace_back(
-      "5.5, deformation: proposed there as an experiment, built here (soft_block.sdf in the table "
-      "of "
-      "scenes). 2 N dent the block by 5 to 8 mm, by impulses alone; tests/lab/soft_press_test "
-      "holds it.");
-  page.List(items);
+  Repeat("fig9", "fig9", rows, page);
 }
 
 void WritePushes(const std::vector<ResultRow>& rows, Html& page) {
@@ -243,27 +207,10 @@ void WritePushes(const std::vector<ResultRow>& rows, Html& page) {
   page.Table({"push", "true", "local 50 Hz", "local 20 Hz", "local 10 Hz", "impulse 50 Hz",
               "impulse 20 Hz", "position 20 Hz", "best peer 50 Hz", "best peer 20 Hz"},
              lines);
-  page.Command("haptic_lab pushes --cases pushes.csv --out again.csv");
+  Repeat("pushes", "pushes", rows, page);
 }
 
 }  // namespace
-
-double SpreadOf(const std::vector<ResultRow>& rows, const std::string& hand,
-                const std::string& mass, const std::string& world_period,
-                const std::string& coupling, std::size_t& subjects) {
-  double squares = 0;
-  subjects = 0;
-  for (const ResultRow& row : rows) {
-    if (row.Text("hand") != hand || row.Text("mass_kg") != mass ||
-        row.Text("Tw_s") != world_period || row.Text("coupling") != coupling) {
-      continue;
-    }
-    ++subjects;
-    squares += std::pow(row.Got("stop_sd_m"), 2);
-  }
-  if (subjects == 0) return std::numeric_limits<double>::quiet_NaN();
-  return std::sqrt(squares / static_cast<double>(subjects));
-}
 
 void WritePeople(const Results& results, Html& page) {
   const std::vector<ResultRow>& rows = RowsOf(results, "people");

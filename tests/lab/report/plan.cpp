@@ -11,6 +11,8 @@
 #include "tests/lab/push_traces.h"
 #include "tests/lab/pushes.h"
 #include "tests/lab/scene_cost.h"
+#include "tests/lab/slides.h"
+#include "tests/lab/soft_press.h"
 #include "tests/lab/subjects.h"
 #include "tests/lab/tensions.h"
 #include "tests/lab/wall.h"
@@ -52,6 +54,34 @@ Table WallRows(bool quick) {
   for (const double period_s : {1e-2, 1e-3}) {
     for (const double mass_kg : {2.9, 7.2}) {
       table.Append({ToField(period_s), ToField(mass_kg), "35.2", "0", "0"});
+    }
+  }
+  return table;
+}
+
+// Any device: K_max T^2/m is a function of b T/m, B T/m and the delay alone, so one of 1 kg at 1 kHz
+// stands for all.
+Table AnyWallRows() {
+  Table table("the walls of any device", {"T_s", "m_kg", "b_Ns_m", "B_Ns_m", "delay_samples"});
+  for (const double device : {0.001, 0.003, 0.01, 0.03, 0.1, 0.3}) {
+    for (const double wall : {0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 0.7, 1.0, 1.4}) {
+      for (int delay = 0; delay <= 2; ++delay) {
+        table.Append(
+            {"0.001", "1", ToField(1e3 * device), ToField(1e3 * wall), std::to_string(delay)});
+      }
+    }
+  }
+  return table;
+}
+
+// The finger's own friction, on what is curved and what has an edge (paper 5.3).
+Table SlideRows(bool quick) {
+  Table table("the slides of the report", {"script", "mu", "coupling", "Tw_s", "phases"});
+  for (const char* script : {"sphere", "edge", "free"}) {
+    for (const char* coupling : {"position", "impulse", "local"}) {
+      for (const char* world_period_s : {"0.02", "0.05", "0.1", "0.2"}) {
+        table.Append({script, "0.3", coupling, world_period_s, quick ? "2" : "10"});
+      }
     }
   }
   return table;
@@ -131,7 +161,7 @@ Table GalleryRows(bool quick) {
     const std::string scene = path.substr(path.rfind('/') + 1);
     const bool large = scene == "thousand.sdf";
     if (quick && large) continue;
-    table.Append({scene, quick ? "1" : large ? "5" : "20"});
+    table.Append({scene, quick ? "1" : large ? "20" : "60"});
   }
   return table;
 }
@@ -160,12 +190,15 @@ std::vector<Chapter> ReportPlan(bool quick) {
       OwnGrid(ErrorVsRuntime(), quick, quick ? 0.5 : 3),
       OwnGrid(EngineError(), quick, 0.5),
       {.name = "wall", .study = Wall(), .rows = WallRows(quick), .row_s = 0.5},
+      {.name = "any-wall", .study = Wall(), .rows = AnyWallRows(), .row_s = 0.02},
       {.name = "masses", .study = MultirateMasses(), .rows = MassRows(quick), .row_s = 1},
       {.name = "extremes", .study = Extremes(), .rows = ExtremeRows(quick), .row_s = 0.3},
       {.name = "pushes", .study = Pushes(), .rows = PushRows(quick), .row_s = quick ? 0.3 : 1.5},
       {.name = "gallery", .study = Gallery(), .rows = GalleryRows(quick), .row_s = quick ? 0.5 : 8},
       OwnGrid(PushTraces(), quick, 0.02),
       OwnGrid(Subjects(), quick, 0.3),
+      {.name = "slides", .study = Slides(), .rows = SlideRows(quick), .row_s = 0.05},
+      OwnGrid(SoftPresses(), quick, 0.2),
       {.name = "scene-cost",
        .study = SceneCost(),
        .rows = SceneCostRows(quick),

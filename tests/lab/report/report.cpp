@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tests/lab/report/report.h"
 
+#include <algorithm>
 #include <fstream>
 #include <numeric>
 #include <ostream>
@@ -45,6 +46,24 @@ void WriteOrigin(const RunnerOptions& options, const Results& results, std::size
   }
 }
 
+// Rows that broke what holds for every row of their study.
+std::size_t WriteBroken(const Results& results, Html& page) {
+  std::size_t all = 0;
+  for (const auto& [chapter, rows] : results) {
+    if (chapter.starts_with("reference_")) continue;  // the last section has them
+    const auto broken =
+        static_cast<std::size_t>(std::count_if(rows.begin(), rows.end(), [](const ResultRow& row) {
+          return row.status == RowStatus::kMissed;
+        }));
+    if (broken > 0) {
+      page.Warning(std::to_string(broken) + " of the " + std::to_string(rows.size()) + " rows of " +
+                   chapter + " broke a bar that holds for every row.");
+    }
+    all += broken;
+  }
+  return all;
+}
+
 void WritePage(const Html& page, const std::string& title, const std::filesystem::path& folder,
                std::ostream& out) {
   const std::filesystem::path path = folder / "index.html";
@@ -64,6 +83,7 @@ std::size_t MakeReport(const std::vector<Chapter>& chapters, const RunnerOptions
   const Results results = ReadResults(chapters, options.folder, missing);
   Html page;
   WriteOrigin(options, results, missing, page);
+  const std::size_t broken = WriteBroken(results, page);
   WriteAnswers(results, page);
   WriteError(results, page);
   WriteStability(results, page);
@@ -77,7 +97,8 @@ std::size_t MakeReport(const std::vector<Chapter>& chapters, const RunnerOptions
   }
   out << "\n";
   if (missed > 0) out << missed << " reference rows were missed\n";
-  return missed;
+  if (broken > 0) out << broken << " other rows broke a bar\n";
+  return missed + broken;
 }
 
 void MakePeoplePage(const std::filesystem::path& folder, std::ostream& out) {

@@ -12,8 +12,8 @@
 namespace rikiseki::lab {
 
 /// Runs what is not finished in the folder, and writes its index.html from what is: when rows of other
-/// shards are missing, it says how many. Returns the number of reference rows that were missed. Throws
-/// ConfigError.
+/// shards are missing, it says how many. Returns the number of reference rows that were missed, and of others that broke
+/// a bar. Throws ConfigError.
 std::size_t MakeReport(const std::vector<Chapter>& chapters, const RunnerOptions& options,
                        std::ostream& out);
 

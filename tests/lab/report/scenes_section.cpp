@@ -35,7 +35,7 @@ void WriteGallery(const std::vector<ResultRow>& rows, Html& page) {
   }
   page.Table({"scene", "needs", "left out", "world tick us p50", "p99", "energy mJ", "jump mm", ""},
              lines);
-  page.Command("haptic_lab gallery --cases gallery.csv --out again.csv");
+  Repeat("gallery", "gallery", rows, page);
 }
 
 void WriteCosts(const std::vector<ResultRow>& rows, Html& page) {
@@ -59,7 +59,7 @@ void WriteCosts(const std::vector<ResultRow>& rows, Html& page) {
   page.Table({"scene: part", "haptic in", "left out", "switched off", "world in", "left out",
               "switched off", "bits"},
              lines);
-  page.Command("haptic_lab scene-cost --jobs 1 --cases scene-cost.csv --out again.csv");
+  Repeat("scene-cost --jobs 1", "scene-cost", rows, page);
 }
 
 }  // namespace

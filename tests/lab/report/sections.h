@@ -12,7 +12,7 @@
 
 namespace rikiseki::lab {
 
-/// The four questions that a lab has, answered from the rows of all chapters.
+/// answers_section.cpp: the four questions that a lab has, answered from the rows of all chapters.
 void WriteAnswers(const Results& results, Html& page);
 /// error_section.cpp: error against run time, and where `local` is not the best.
 void WriteError(const Results& results, Html& page);
@@ -20,6 +20,8 @@ void WriteError(const Results& results, Html& page);
 void WriteStability(const Results& results, Html& page);
 /// scenes_section.cpp: what scenes leave out, and what it costs.
 void WriteScenes(const Results& results, Html& page);
+/// remarks_section.cpp: what the paper's section 5 remarks, and whether it holds here.
+void WriteRemarks(const Results& results, Html& page);
 /// paper_section.cpp: the paper's figures, its claims, and the pushes against other software.
 void WritePaper(const Results& results, Html& page);
 /// paper_section.cpp: the same task done by people, where there are rows of it.
@@ -35,6 +37,19 @@ const std::vector<ResultRow>& RowsOf(const Results& results, const std::string& 
 double SpreadOf(const std::vector<ResultRow>& rows, const std::string& hand,
                 const std::string& mass, const std::string& world_period,
                 const std::string& coupling, std::size_t& subjects);
+
+/// The masses at which a lasting contact is stable, by a row of `masses`.
+struct MassInterval {
+  double from_kg;
+  double to_kg;  // inf: any above
+};
+std::vector<MassInterval> StableIntervals(const ResultRow& row);
+/// The same in words, in kg: "0.458 and more".
+std::string StableMasses(const ResultRow& row);
+
+/// Says with which command a chapter's rows are run again from their file, and where they ran.
+void Repeat(const std::string& command, const std::string& chapter,
+            const std::vector<ResultRow>& rows, Html& page);
 
 /// "diverged" where a value is not finite, else three digits and the unit.
 std::string Value(double value, const std::string& unit = "");

@@ -89,26 +89,7 @@ void WriteWalls(const std::vector<ResultRow>& rows, Html& page) {
         "is a heavy manipulator: b + B = 35.2 Ns/m.");
     page.Table({"rate and mass", "computed", "quoted"}, pair);
   }
-  page.Command("haptic_lab wall --cases wall.csv --out again.csv");
-}
-
-struct Interval {
-  double from;
-  double to;
-};
-
-std::vector<Interval> Stable(const ResultRow& row) {
-  std::vector<Interval> intervals;
-  const auto text = row.texts.find("stable_intervals_kg_in_1e-5..1e4");
-  if (text == row.texts.end()) return intervals;
-  std::istringstream parts(text->second);
-  for (std::string part; std::getline(parts, part, ';');) {
-    const std::size_t dots = part.find("..");
-    if (dots == std::string::npos) continue;
-    intervals.push_back(
-        {std::strtod(part.c_str(), nullptr), std::strtod(part.c_str() + dots + 2, nullptr)});
-  }
-  return intervals;
+  Repeat("wall", "wall", rows, page);
 }
 
 bool IsUsual(const ResultRow& row) {
@@ -145,9 +126,9 @@ void WriteMassMap(const std::vector<ResultRow>& rows, Html& page) {
           continue;
         }
         const double period_s = row.Number("Tw_s");
-        for (const Interval& interval : Stable(row)) {
-          stable.points.push_back({period_s, interval.from});
-          stable.tops.push_back(interval.to);
+        for (const MassInterval& interval : StableIntervals(row)) {
+          stable.points.push_back({period_s, interval.from_kg});
+          stable.tops.push_back(interval.to_kg);
         }
         if (i == 0) theory.points.push_back({period_s, 2000 * period_s * period_s / 4});
         if (i == 2) theory.points.push_back({period_s, 2000 * 1e-6 / 4 + 2 * 1e-3 / 2});
@@ -166,14 +147,8 @@ void WriteMassTable(const std::string& title, const std::string& what,
   page.Paragraph(title);
   std::vector<std::vector<std::string>> lines;
   for (const ResultRow* row : rows) {
-    std::string intervals;
-    for (const Interval& interval : Stable(*row)) {
-      intervals += intervals.empty() ? "" : ", ";
-      intervals += Short(interval.from) + " to " +
-                   (std::isfinite(interval.to) ? Short(interval.to) + " kg" : "any");
-    }
-    lines.push_back({row->Text("method"), Short(scale * row->Number(column)) + unit,
-                     intervals.empty() ? "none" : intervals});
+    lines.push_back(
+        {row->Text("method"), Short(scale * row->Number(column)) + unit, StableMasses(*row)});
   }
   page.Table({"method", what, "stable masses, kg"}, lines);
 }
@@ -194,7 +169,7 @@ void WriteMasses(const std::vector<ResultRow>& rows, Html& page) {
       "stiffness", stiffness, "kp_N_m", 1, " N/m", page);
   WriteMassTable("The haptic rate, medium hand, 10 Hz world, 2 kN/m, 2 Ns/m.", "haptic period",
                  rate, "T_s", 1e3, " ms", page);
-  page.Command("haptic_lab multirate --cases masses.csv --out again.csv");
+  Repeat("multirate", "masses", rows, page);
 }
 
 void WriteExtremes(const std::vector<ResultRow>& rows, Html& page) {
@@ -241,7 +216,7 @@ void WriteExtremes(const std::vector<ResultRow>& rows, Html& page) {
     page.Warning("The detector was wrong here:");
     page.Table({"run", "k N/m", "M kg", "growth", "theory", "detector"}, wrong);
   }
-  page.Command("haptic_lab extremes --cases extremes.csv --out again.csv");
+  Repeat("extremes", "extremes", rows, page);
 }
 
 }  // namespace

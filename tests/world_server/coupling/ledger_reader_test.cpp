@@ -491,7 +491,7 @@ HapticTick Touching(std::uint64_t tick, double x, double stiffness,
   return message;
 }
 
-TEST_CASE("with what a body is owed comes what it cost the finger, and what its spring holds") {
+TEST_CASE("with what a body is owed comes what it cost the finger, and what its spring held") {
   LedgerReader reader = MakeReader(Coupling::kLocal);
   constexpr std::int64_t kMilli = 1'000'000'000;  // 1 mN s: in a tick of 1 ms, 1 N
   reader.Consume(Touching(1, 0, 2000, {}));
@@ -500,7 +500,7 @@ TEST_CASE("with what a body is owed comes what it cost the finger, and what its 
   auto owed = reader.Take();
   REQUIRE(owed.size() == 1);
   CHECK(owed[0].work_j == Approx(2 * 0.003));  // nothing was held before tick 2
-  CHECK(owed[0].spring_j == Approx((2.0 * 2 + 4 * 4) / (2 * 2000)));
+  CHECK(owed[0].spring_j == 0);                // nor before this world tick
 
   // The force of the last message before is this world tick's; of lost ones the mean is known.
   reader.Consume(Touching(4, 0.003, 2000, {On(0, 6 * kMilli, 2)}));
@@ -508,6 +508,23 @@ TEST_CASE("with what a body is owed comes what it cost the finger, and what its 
   owed = reader.Take();
   REQUIRE(owed.size() == 1);
   CHECK(owed[0].work_j == Approx(4 * -0.001 + 3 * 0.004));
+  CHECK(owed[0].spring_j == Approx(4.0 * 4 / (2 * 2000)));
+
+  // Of two fingers on one body both springs count, and neither of a finger that has let go.
+  Channel second = On(0, 2 * kMilli, 9);
+  second.pointer = 1;
+  reader.Consume(Touching(9, 0.007, 2000, {On(0, 20 * kMilli, 2), second}));
+  reader.Take();
+  reader.Consume(Touching(10, 0.007, 2000, {On(0, 21 * kMilli, 2)}));
+  owed = reader.Take();
+  REQUIRE(owed.size() == 1);
+  CHECK(owed[0].spring_j == Approx((2.0 * 2 + 2 * 2) / (2 * 2000)));
+  reader.Consume(Touching(11, 0.007, 2000, {}));
+  reader.Take();
+  reader.Consume(Touching(12, 0.007, 2000, {On(0, 1 * kMilli, 12)}));
+  owed = reader.Take();
+  REQUIRE(owed.size() == 1);
+  CHECK(owed[0].spring_j == 0);
 }
 
 TEST_CASE("what is given back counts as discarded, to the unit") {

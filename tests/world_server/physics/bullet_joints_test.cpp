@@ -8,6 +8,7 @@
 
 #include "tests/world_server/jointed_scenes.h"
 #include "world_server/physics/bullet_world.h"
+#include "world_server/physics/linkage.h"
 
 namespace rikiseki::world {
 namespace {
@@ -131,6 +132,18 @@ TEST_CASE("a door kicked off its centre takes J r / I about its hinge, at once")
         Approx(2 * speed).epsilon(speed * speed * kSubstep * kSubstep / 4));
   CHECK(world.State(0).angular_velocity.z() == Approx(speed).epsilon(1e-9));
   CHECK(Apart(scene, States(world)) < 1e-11);
+}
+
+TEST_CASE("a joint between bodies that cannot move holds nothing, and nothing falls over it") {
+  Scene scene = Door();
+  for (SceneBody& body : scene.bodies) body.fixed = true;
+  CHECK(Linkage::Of(scene).empty());
+  BulletWorld world(scene, kSubstep);
+  const std::vector<BodyState> before = States(world);
+  world.ApplyAndStep({}, 100);
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    CHECK(world.State(i).pose.position == before[i].pose.position);
+  }
 }
 
 TEST_CASE("two hinges hold a door as one does") {
