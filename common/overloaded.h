@@ -8,5 +8,7 @@ template <typename... Functions>
 struct Overloaded : Functions... {
   using Functions::operator()...;
 };
+template <typename... Functions>
+Overloaded(Functions...) -> Overloaded<Functions...>;  // older Clangs do not deduce it
 
 }  // namespace rikiseki

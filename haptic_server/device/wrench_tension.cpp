@@ -29,7 +29,7 @@ class BoxProgram {
  public:
   BoxProgram(const Matrix68& strings, const Vector6& wanted, const TensionBounds& bounds,
              double rest_n)
-      : strings_(strings), wanted_(wanted), bounds_(bounds) {
+      : bounds_(bounds), rest_n_(rest_n) {
     hessian_.noalias() = strings.transpose() * strings;
     hessian_.diagonal().array() += kRestWeight;
     linear_.noalias() = strings.transpose() * wanted;
@@ -43,17 +43,22 @@ class BoxProgram {
     const Vector8 unbounded = FreeStep(Downhill());
     tension_ = Clamped(unbounded);
     for (Eigen::Index i = 0; i < 8; ++i) held_[i] = tension_[i] != unbounded[i];
-    for (int pass = 0; pass < kMaxPasses; ++pass) {
-      const bool arrived = Advance(FreeStep(Downhill()));
-      if (arrived && !ReleaseOne()) break;
-    }
-    // The wish for rest has drawn the wrench off by its weight: what a step for the wrench alone
-    // puts back, to rounding where it meets no bound.
-    Advance(FreeStep(strings_.transpose() * (wanted_ - strings_ * tension_)));
+    Descend();
+    // The wish for rest has drawn the wrench off by its weight. To stay where this is weighs the same
+    // and draws by nothing: what is left of the slope is that weight times the way gone now.
+    linear_ += kRestWeight * (tension_ - rest_n_ * Vector8::Ones());
+    Descend();
     return tension_;
   }
 
  private:
+  void Descend() {
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
+      const bool arrived = Advance(FreeStep(Downhill()));
+      if (arrived && !ReleaseOne()) return;
+    }
+  }
+
   Vector8 Clamped(const Vector8& tension) const {
     return tension.cwiseMax(bounds_.min_n).cwiseMin(bounds_.max_n);
   }
@@ -113,9 +118,8 @@ class BoxProgram {
     return true;
   }
 
-  Matrix68 strings_;
-  Vector6 wanted_;
   TensionBounds bounds_;
+  double rest_n_;
   Matrix8 hessian_;
   Vector8 linear_;
   double slope_;

@@ -31,7 +31,7 @@ class WrongString {
   std::string Complaint() const;
 
  private:
-  struct Blamed {
+  struct alignas(8) Blamed {  // so that every compiler does without a lock
     std::int32_t number = 0;  // 0: none
     float excess_mm = 0;
   };

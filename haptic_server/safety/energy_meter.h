@@ -80,7 +80,6 @@ class EnergyMeter {
   double largest_braking_;    // N s/m
   double largest_split_ = 0;  // J, in a window
   double period_s_;
-  std::int64_t window_ticks_;
 
   bool known_ = false;  // a sample came before
   Vec3 position_ = Vec3::Zero();

@@ -37,7 +37,6 @@ haptic::MotorProgram::Script Waiting(const haptic::Settings& settings) {
 EmulatedBoard::EmulatedBoard(const haptic::Settings& settings, int switch_id, Begins begins)
     : settings_(settings),
       switch_id_(switch_id),
-      begins_(begins),
       program_(begins == Begins::kByItself ? ScriptOf(settings.hand) : Waiting(settings)),
       board_(settings.spidar,
              {[this](double t_s) { return HandTarget(t_s); }, ImpedanceOf(settings)}) {}

@@ -80,7 +80,6 @@ class EmulatedBoard final : public EmulatedFirmware {
 
   haptic::Settings settings_;
   int switch_id_;
-  Begins begins_;
   haptic::MotorProgram program_;
   double begun_s_ = 0;
   bool is_requested_ = false;

@@ -21,6 +21,10 @@ const ResultRow* FindRow(const std::vector<ResultRow>& rows,
   return nullptr;
 }
 
+std::string Largest(double stiffness) {
+  return stiffness > 0 ? Short(stiffness) : "none";
+}
+
 // How far a rule is from what the loop holds, in percent.
 struct RuleError {
   double most_above = 0;
@@ -86,19 +90,18 @@ void AnswerAnyDevice(const Results& results, Html& page) {
   };
   const std::vector<double> device_dampings = all("b_Ns_m");
   const std::vector<double> wall_dampings = all("B_Ns_m");
-  std::vector<std::string> header = {"K T^2/m"};
-  for (const double wall : wall_dampings) header.push_back("B T/m = " + Short(1e-3 * wall));
+  std::vector<std::string> header = {"K T^2/m, by b T/m (down) and B T/m"};
+  for (const double wall : wall_dampings) header.push_back(Short(1e-3 * wall));
   std::vector<std::vector<std::string>> lines;
   for (const auto& [delay, said] :
        {std::pair("0", ""), std::pair("1", ", a tick late"), std::pair("2", ", two ticks late")}) {
     for (const double device : device_dampings) {
-      std::vector<std::string> line = {"b T/m = " + Short(1e-3 * device) + said};
+      std::vector<std::string> line = {Short(1e-3 * device) + said};
       for (const double wall : wall_dampings) {
         const ResultRow* row = FindRow(
             rows,
             {{"b_Ns_m", ToField(device)}, {"B_Ns_m", ToField(wall)}, {"delay_samples", delay}});
-        const double largest = row == nullptr ? 0 : row->Got("kappa=Kmax*T^2/m");
-        line.push_back(largest > 0 ? Short(largest) : "none");
+        line.push_back(row == nullptr ? "" : Largest(row->Got("kappa=Kmax*T^2/m")));
       }
       lines.push_back(line);
     }
@@ -139,7 +142,7 @@ void AnswerStiffness(const Results& results, Html& page) {
                                                 {"B_Ns_m", wall_damping},
                                                 {"delay_samples", delay},
                                                 {"T_s", ToField(period_s)}});
-          line.push_back(row == nullptr ? "" : Value(row->Got("Kmax_eig_N_m")));
+          line.push_back(row == nullptr ? "" : Largest(row->Got("Kmax_eig_N_m")));
         }
       }
       lines.push_back(line);

@@ -308,10 +308,11 @@ void WriteError(const Results& results, Html& page) {
                              Short(row.got.at("haptic_p999_us"))});
     lines.push_back(line);
   }
-  page.Table({"run", "T ms", "Tw ms", "substep ms", "error mm", "of the split mm", "its bias mm",
-              "its SD mm", "impulse N s", "force RMS N", "injected mJ", "jump mm", "CPU %",
-              "tick us p50", "p99.9"},
-             lines);
+  page.FoldedTable(std::to_string(rows.size()) + " runs, a line each",
+                   {"run", "T ms", "Tw ms", "substep ms", "error mm", "of the split mm",
+                    "its bias mm", "its SD mm", "impulse N s", "force RMS N", "injected mJ",
+                    "jump mm", "CPU %", "tick us p50", "p99.9"},
+                   lines);
   Repeat("error-vs-runtime", "error-vs-runtime", rows, page);
   if (const auto& engine = RowsOf(results, "engine-error"); !engine.empty()) {
     WriteEngine(engine, page);

@@ -14,15 +14,16 @@ constexpr const char* kStyle = R"(
   --grid: #39414a; --c0: #fb923c; --c1: #7aa2ff; --c2: #4ade80; --c3: #d8a4ff; --c4: #f472b6;
   --c5: #a8b0b8; } }
 body { font: 15px/1.5 system-ui, sans-serif; color: var(--text); background: var(--back);
-  max-width: 1000px; margin: 0 auto; padding: 1.5em; }
+  max-width: 1240px; margin: 0 auto; padding: 1.5em; }
 h1 { font-size: 1.7em; } h2 { margin-top: 2em; border-bottom: 1px solid var(--grid); }
 table { border-collapse: collapse; margin: 1em 0; display: block; overflow-x: auto; }
 th, td { padding: .2em .7em; border-bottom: 1px solid var(--grid); text-align: right;
   font-variant-numeric: tabular-nums; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
-thead th { background: var(--soft); }
+thead th { background: var(--soft); white-space: normal; vertical-align: bottom; }
 code { background: var(--soft); padding: .1em .35em; border-radius: 3px; }
 p.command { font-size: .85em; } p.warning { border-left: 4px solid var(--c0); padding-left: .8em; }
+details { margin: 1em 0; } summary { cursor: pointer; }
 .figures { display: grid; grid-template-columns: repeat(auto-fit, minmax(400px, 1fr)); gap: 1em; }
 .plot { width: 100%; height: auto; } .plot text { fill: var(--text); font-size: 11px; }
 .plot .title { font-size: 13px; font-weight: 600; } .plot .axis { font-size: 12px; }
@@ -73,6 +74,13 @@ void Html::Table(const std::vector<std::string>& header,
     out_ << "</tr>\n";
   }
   out_ << "</tbody></table>\n";
+}
+
+void Html::FoldedTable(const std::string& summary, const std::vector<std::string>& header,
+                       const std::vector<std::vector<std::string>>& rows) {
+  out_ << "<details><summary>" << Escaped(summary) << "</summary>\n";
+  Table(header, rows);
+  out_ << "</details>\n";
 }
 
 void Html::Figures(const std::vector<Plot>& plots) {

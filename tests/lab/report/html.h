@@ -21,6 +21,9 @@ class Html {
   /// The first column is text, the others stand on the right.
   void Table(const std::vector<std::string>& header,
              const std::vector<std::vector<std::string>>& rows);
+  /// The same, out of the way until somebody opens it.
+  void FoldedTable(const std::string& summary, const std::vector<std::string>& header,
+                   const std::vector<std::vector<std::string>>& rows);
   void Figures(const std::vector<Plot>& plots);
   /// The command that repeats what stands above, and the computers that it ran on.
   void Command(const std::string& text, const std::string& machines = "");

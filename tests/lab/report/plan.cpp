@@ -115,24 +115,6 @@ Table MassRows(bool quick) {
   return table;
 }
 
-// Beside the quick grid, contacts at three pairs of rates: enough to hold the flag against theory.
-Table ExtremeRows(bool quick) {
-  Table table = Extremes().grid(true);
-  if (quick) return table;
-  for (const char* coupling : {"position", "impulse", "local"}) {
-    for (const auto& [haptic_hz, world_hz] :
-         {std::pair("1000", "20"), std::pair("1000", "200"), std::pair("200", "20")}) {
-      for (const char* stiffness : {"10", "2000", "100000"}) {
-        for (const char* mass : {"0.0001", "0.03", "3", "100", "10000"}) {
-          table.Append(
-              {"slot", coupling, haptic_hz, world_hz, stiffness, "2", mass, "medium", "0", "30"});
-        }
-      }
-    }
-  }
-  return table;
-}
-
 Table PushRows(bool quick) {
   const Table truth = Table::Load(RIKISEKI_DATA_DIR "/push_table.csv");
   Table table("the pushes of the report",
@@ -192,7 +174,7 @@ std::vector<Chapter> ReportPlan(bool quick) {
       {.name = "wall", .study = Wall(), .rows = WallRows(quick), .row_s = 0.5},
       {.name = "any-wall", .study = Wall(), .rows = AnyWallRows(), .row_s = 0.02},
       {.name = "masses", .study = MultirateMasses(), .rows = MassRows(quick), .row_s = 1},
-      {.name = "extremes", .study = Extremes(), .rows = ExtremeRows(quick), .row_s = 0.3},
+      OwnGrid(Extremes(), quick, 0.3),
       {.name = "pushes", .study = Pushes(), .rows = PushRows(quick), .row_s = quick ? 0.3 : 1.5},
       {.name = "gallery", .study = Gallery(), .rows = GalleryRows(quick), .row_s = quick ? 0.5 : 8},
       OwnGrid(PushTraces(), quick, 0.02),

@@ -423,6 +423,7 @@ TEST_CASE("message by message is the same in all as what is handed out at once")
   send(1);
   reader.Take();
   std::uint64_t taken_ns = start_ns;
+  std::uint64_t taken_tick = tick;
   for (int frame = 0; frame < 100; ++frame) {
     for (std::int64_t i = below(40); i > 0; --i) send(below(10) == 0 ? 7 : 1);
     std::array<Vec3, 3> impulse;
@@ -444,7 +445,9 @@ TEST_CASE("message by message is the same in all as what is handed out at once")
     }
     REQUIRE(end == reader.replay().impulses.size());
     REQUIRE(covered == Approx(static_cast<double>(start_ns - taken_ns) * 1e-9).margin(1e-12));
+    REQUIRE(ticks == tick - taken_tick);
     taken_ns = start_ns;
+    taken_tick = tick;
     for (const ReplayImpulse& push : reader.replay().impulses) {
       REQUIRE(push.body < 2);  // body 2 cannot move
       impulse[push.body] -= push.impulse;

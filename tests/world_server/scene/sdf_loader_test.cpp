@@ -411,16 +411,16 @@ TEST_CASE("threads that load scenes leave standard error as it was, and their re
   std::array<int, 4> refused{};
   for (std::size_t i = 0; i < refused.size(); ++i) {
     const std::string name = "scene" + std::to_string(i) + ".sdf";
-    threads.emplace_back([&folder, &refused, i, name,
-                          path = folder.Write(name, World("<nonsense" + std::to_string(i)))] {
-      for (int k = 0; k < 20; ++k) {
-        try {
-          LoadSdf(path);
-        } catch (const ConfigError& error) {
-          if (Contains(error.what(), name)) ++refused[i];
-        }
-      }
-    });
+    threads.emplace_back(
+        [&refused, i, name, path = folder.Write(name, World("<nonsense" + std::to_string(i)))] {
+          for (int k = 0; k < 20; ++k) {
+            try {
+              LoadSdf(path);
+            } catch (const ConfigError& error) {
+              if (Contains(error.what(), name)) ++refused[i];
+            }
+          }
+        });
   }
   threads.clear();
   CHECK(std::cerr.rdbuf() == before);

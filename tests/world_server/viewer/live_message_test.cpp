@@ -60,7 +60,7 @@ Update Decoded(const std::string& message) {
   update.head = json::parse(message.substr(sizeof head_bytes, head_bytes));
   const std::string rest = message.substr(sizeof head_bytes + head_bytes);
   update.numbers.resize(rest.size() / sizeof(double));
-  std::memcpy(update.numbers.data(), rest.data(), rest.size());
+  if (!rest.empty()) std::memcpy(update.numbers.data(), rest.data(), rest.size());
   update.stride =
       kTickNumbers + update.head["ticks"]["pointers"].get<std::size_t>() * kPointerNumbers;
   std::size_t bodies = 0;
