@@ -27,7 +27,10 @@ FeatureSwitch::Change All(std::vector<FeatureSwitch::Change> changes) {
 }
 
 void NothingMoves(Touch& touch) {
-  for (world::SceneBody& body : touch.scene.bodies) body.fixed = true;
+  for (world::SceneBody& body : touch.scene.bodies) {
+    body.fixed = true;
+    body.softness.reset();  // as a scene's file says: what is static does not deform
+  }
 }
 
 // The surfaces stay where they were first seen.

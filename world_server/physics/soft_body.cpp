@@ -51,6 +51,7 @@ SoftBody::SoftBody(TetrahedralMesh mesh, const SoftMaterial& material, double ma
   mu_ = e / (2 * (1 + nu));
   lambda_ = e * nu / ((1 + nu) * (1 - 2 * nu));
   MakeElements(mass_kg);
+  if (free_count_ == 0) throw std::invalid_argument("a soft body needs a place that nothing holds");
   const bool something_holds =
       std::any_of(held_.begin(), held_.end(), [](std::uint8_t flag) { return flag != 0; });
   unloaded_ = positions_;

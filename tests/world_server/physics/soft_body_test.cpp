@@ -294,6 +294,8 @@ TEST_CASE("what is no soft body is refused") {
   CHECK_THROWS_AS(make(sound, 0.1, pinned, Vec3::Zero()), std::invalid_argument);
   pinned[1] = 1;
   CHECK_THROWS_AS(make(sound, 0.1, pinned, Vec3::Zero()), std::invalid_argument);
+  const std::vector<std::uint8_t> all(free.size(), 1);
+  CHECK_THROWS_AS(make(sound, 0.1, all, Vec3::Zero()), std::invalid_argument);
   // 10 Pa under 60 mm of water's weight.
   const auto foot = HeldWhere(mesh, [](const Vec3& p) { return p.z() < -0.03 + 1e-9; });
   CHECK_THROWS_AS(make({.youngs_modulus_pa = 10}, 0.1, foot, {0, 0, -9.81}), std::invalid_argument);
