@@ -156,12 +156,15 @@ FeatureSwitch::Change Without(bool world::EngineParts::*part) {
   };
 }
 
-// What is touched, alone and weightless: it meets nothing but the finger.
+// What is touched, alone and weightless: it meets nothing but the finger, and what is soft that by which it is held.
 void Alone(Touch& touch) {
   std::vector<world::SceneBody>& bodies = touch.scene.bodies;
   const auto moving = std::find_if(bodies.begin(), bodies.end(),
                                    [](const world::SceneBody& body) { return !body.fixed; });
-  bodies = {moving == bodies.end() ? bodies.front() : *moving};
+  const world::SceneBody kept = moving == bodies.end() ? bodies.front() : *moving;
+  std::erase_if(bodies,
+                [&](const world::SceneBody& body) { return !(kept.softness && body.fixed); });
+  bodies.push_back(kept);
   touch.scene.joints.clear();
   touch.scene.gravity.setZero();
 }
