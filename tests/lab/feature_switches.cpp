@@ -200,6 +200,7 @@ std::vector<FeatureSwitch> FeatureSwitches() {
     if (plane.inverse_mass > 0) plane.inverse_mass = protocol::kMobilityNotSaid;
   });
   const haptic::RenderSettings usual;
+  const auto no_own_stiffness = OwnStiffness(0, 0);  // not said
   using world::EngineParts;
   const auto in_air = EachBody([](world::SceneBody& body) { body.drag_ns_per_m = 1; });
   const auto in_vacuum =
@@ -226,9 +227,10 @@ std::vector<FeatureSwitch> FeatureSwitches() {
        All({Coupling(kImpulse), Rule(kSemiImplicit)}), true},
       {"interpolation", All({Coupling(kImpulse), Display(kInterpolate)}),
        All({PlanesStay, Display(kInterpolate)}), All({PlanesStay, Display(kHold)}), true},
-      {"damping", Damping(5, false), Damping(0, true), Damping(0, false), true},
+      {"damping", All({no_own_stiffness, Damping(5, false)}),
+       All({no_own_stiffness, Damping(0, true)}), All({no_own_stiffness, Damping(0, false)}), true},
       {"own stiffness", OwnStiffness(1000, 1),
-       OwnStiffness(usual.stiffness_n_per_m, usual.damping_ns_per_m), AsItIs, true},
+       OwnStiffness(usual.stiffness_n_per_m, usual.damping_ns_per_m), no_own_stiffness, true},
       {"recovery time", Recovery(0.3), Recovery(haptic::kRecoveryTime), AsItIs, false},
       {"mobility", AsItIs, AsItIs, mobility_not_said, false},
       {"another pointer", PlanesForAnother, PlanesForAnother, AsItIs, false},

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <stdexcept>
 
 #include "haptic_server/device/mapping.h"
@@ -91,6 +92,33 @@ Vec3 HandTarget(const Touch& touch, double t_s) {
   return touch.place + out * touch.normal + along * Across(touch.normal);
 }
 
+// What the world itself says of a finger there, before anything moves.
+std::vector<protocol::Plane> PlanesAbout(const Touch& touch, const Vec3& finger, double radius_mm) {
+  world::Settings settings = touch.world;
+  settings.features.radius_mm = radius_mm;
+  world::WorldStep world(settings, touch.scene,
+                         world::MakeDynamics(touch.scene, settings.physics.substep_ms * 1e-3), 0);
+  world.BeginHapticEpoch(1);
+  protocol::HapticTick tick;
+  tick.pointer_count = 1;
+  tick.pointers[0].position = ToArray(finger);
+  world.Consume(tick);
+  protocol::WorldFrame frame;
+  world.Tick(0, frame);
+  return {frame.planes.begin(), frame.planes.begin() + frame.plane_count};
+}
+
+// The hand waits where nothing is touched.
+bool IsFreeAtRest(const Touch& touch) {
+  const Vec3 finger = HandTarget(touch, 0);
+  const double radius = touch.haptic.render.finger_radius_mm * 1e-3;
+  const std::vector<protocol::Plane> planes =
+      PlanesAbout(touch, finger, touch.world.features.radius_mm);
+  return std::all_of(planes.begin(), planes.end(), [&](const protocol::Plane& plane) {
+    return (finger - ToVec3(plane.point)).dot(ToVec3(plane.normal)) > radius;
+  });
+}
+
 void Append(const protocol::HapticTick& tick, std::vector<std::uint64_t>& trace) {
   protocol::HapticTick told = tick;
   told.stiffness = told.damping = told.force_cap = 0;
@@ -120,26 +148,21 @@ Touch TouchOf(const world::Scene& scene) {
   if (body == scene.bodies.size()) body = 0;
   if (body == scene.bodies.size()) throw std::invalid_argument(scene.name + ": nothing to touch");
 
-  // The world itself says where the nearest point is, seen from afar.
-  world::Settings wide = touch.world;
-  wide.features.radius_mm = 1e6;
-  world::WorldStep world(wide, scene, world::MakeDynamics(scene, wide.physics.substep_ms * 1e-3),
-                         0);
-  world.BeginHapticEpoch(1);
-  protocol::HapticTick finger;
-  finger.pointer_count = 1;
-  finger.pointers[0].position =
-      ToArray(Vec3(scene.bodies[body].pose_WB.position - kFarAway * Vec3::UnitX()));
-  world.Consume(finger);
-  protocol::WorldFrame frame;
-  world.Tick(0, frame);
-  for (std::uint32_t i = 0; i < frame.plane_count; ++i) {  // nearest first
-    if (frame.planes[i].body != body) continue;
-    touch.place = ToVec3(frame.planes[i].point);
-    touch.normal = ToVec3(frame.planes[i].normal);
-    return touch;
+  std::optional<Touch> first;
+  for (const Vec3& side : {Vec3(-Vec3::UnitX()), Vec3(Vec3::UnitX()), Vec3(-Vec3::UnitY()),
+                           Vec3(Vec3::UnitY()), Vec3(Vec3::UnitZ())}) {
+    const Vec3 afar = scene.bodies[body].pose_WB.position + kFarAway * side;
+    for (const protocol::Plane& plane : PlanesAbout(touch, afar, 1e6)) {  // nearest first
+      if (plane.body != body) continue;
+      touch.place = ToVec3(plane.point);
+      touch.normal = ToVec3(plane.normal);
+      if (IsFreeAtRest(touch)) return touch;
+      if (!first) first = touch;
+      break;
+    }
   }
-  throw std::invalid_argument(scene.name + ": the body to touch has no shape");
+  if (!first) throw std::invalid_argument(scene.name + ": the body to touch has no shape");
+  return *first;
 }
 
 bool SameMotion(const TouchResult& a, const TouchResult& b) {

@@ -33,7 +33,7 @@ btVector3 SpeedBefore(const btRigidBody& rigid, const BulletBodies& bodies, cons
 
 }  // namespace
 
-void Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodies& bodies,
+bool Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodies& bodies,
              double gravity, double step_s) {
   const btScalar slowest = std::max(kSlowestBounce, 2 * gravity * step_s);
   std::vector<Bounce> bounces;
@@ -70,6 +70,7 @@ void Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodie
       bounce.second->applyImpulse(-change, bounce.arm_second);
     }
   }
+  return !bounces.empty();
 }
 
 }  // namespace rikiseki::world

@@ -14,8 +14,8 @@ namespace rikiseki::world {
 inline constexpr double kSlowestBounce = 0.02;  // m/s
 
 /// Gives the rebound of the substep that has just ended to the velocities. Two surfaces' restitutions
-/// combine as their product. `gravity` in m/s^2.
-void Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodies& bodies,
+/// combine as their product. `gravity` in m/s^2. Whether anything bounced.
+bool Rebound(std::span<btPersistentManifold* const> manifolds, const BulletBodies& bodies,
              double gravity, double step_s);
 
 }  // namespace rikiseki::world

@@ -233,8 +233,7 @@ void GroupedWorld::Step(const Group& group, double step_s, int sweeps) {
   integrateTransformsInternal(rigids_.data(), static_cast<int>(rigids_.size()), step_s);
   EndSubstep(manifolds_, bodies_.moving, stepped_, step_s, parts_.rotation);
   jointed_->EndSubstep(manifolds_, step_s);
-  if (parts_.rebound) {
-    Rebound(manifolds_, bodies_, gravity_, step_s);
+  if (parts_.rebound && Rebound(manifolds_, bodies_, gravity_, step_s)) {
     for (const std::size_t place : stepped_) jointed_->Settle(place);
   }
   for (const std::size_t place : stepped_) {
