@@ -14,8 +14,10 @@ namespace rikiseki::lab {
 
 /// answers_section.cpp: the four questions that a lab has, answered from the rows of all chapters.
 void WriteAnswers(const Results& results, Html& page);
-/// error_section.cpp: error against run time, and where `local` is not the best.
+/// error_section.cpp: error against run time.
 void WriteError(const Results& results, Html& page);
+/// budgets_section.cpp: what each coupling gets right within a CPU budget, by the rows of error-vs-runtime.
+void WriteBudgets(const std::vector<ResultRow>& rows, Html& page);
 /// stability_section.cpp
 void WriteStability(const Results& results, Html& page);
 /// scenes_section.cpp: what scenes leave out, and what it costs.
