@@ -7,6 +7,7 @@
 #include "tests/lab/push_script.h"
 #include "tests/lab/touch_run.h"
 #include "world_server/physics/bullet_world.h"
+#include "world_server/scene/sdf_loader.h"
 
 namespace rikiseki::lab {
 namespace {
@@ -64,6 +65,20 @@ TEST_CASE("left out is switched out, to the bit, at a wall that no axis is norma
     const TouchResult left_out = Run(scene, feature.left_out);
     CHECK(left_out.largest_force_n > 0.5);
     CHECK(SameMotion(left_out, Run(scene, feature.switched_out)));
+  }
+}
+
+// Joints, softness, surfaces with a stiffness of their own, and a place where the hand could not wait on the usual side.
+TEST_CASE("left out is switched out, to the bit, in the scenes that ship") {
+  for (const char* name : {"door.sdf", "peg_in_hole.sdf", "soft_block.sdf", "stiff_wall.sdf"}) {
+    const world::Scene scene =
+        world::LoadSdf(std::string(RIKISEKI_SOURCE_DIR "/config/scenes/") + name).scene;
+    for (const FeatureSwitch& feature : FeatureSwitches()) {
+      CAPTURE(name, feature.name);
+      const TouchResult left_out = Run(scene, feature.left_out);
+      CHECK(left_out.largest_force_n > 0.5);
+      CHECK(SameMotion(left_out, Run(scene, feature.switched_out)));
+    }
   }
 }
 
