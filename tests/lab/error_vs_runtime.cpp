@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/lab/choose.h"
+#include "tests/lab/coupling_column.h"
 #include "tests/lab/error_run.h"
 
 namespace rikiseki::lab {
@@ -31,9 +32,6 @@ constexpr Named<ErrorSystem> kSystems[] = {{"P", ErrorSystem::kPoke},
                                            {"offcentre", ErrorSystem::kOffCentre},
                                            {"corner", ErrorSystem::kCorner},
                                            {"stack", ErrorSystem::kStack}};
-constexpr Named<protocol::Coupling> kCouplings[] = {{"position", protocol::Coupling::kPosition},
-                                                    {"impulse", protocol::Coupling::kImpulse},
-                                                    {"local", protocol::Coupling::kLocal}};
 constexpr Named<haptic::DisplayRule> kDisplays[] = {
     {"interpolate", haptic::DisplayRule::kInterpolate},
     {"hold", haptic::DisplayRule::kHold},

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "tests/lab/choose.h"
+#include "tests/lab/coupling_column.h"
 #include "tests/lab/extreme_run.h"
 #include "tests/lab/hand_column.h"
 #include "tests/lab/multirate_loop.h"
@@ -57,12 +58,6 @@ constexpr Named<ExtremeEvent> kEvents[] = {
     {"far", ExtremeEvent::kFar},           {"nan", ExtremeEvent::kNotFinite},
     {"denormal", ExtremeEvent::kDenormal}, {"silent", ExtremeEvent::kSilence},
 };
-constexpr Named<protocol::Coupling> kCouplings[] = {
-    {"position", protocol::Coupling::kPosition},
-    {"impulse", protocol::Coupling::kImpulse},
-    {"local", protocol::Coupling::kLocal},
-};
-
 ExtremeRun ParseRun(const Row& row) {
   ExtremeRun run;
   run.event = Choose(row, "event", kEvents);

@@ -156,7 +156,8 @@ FeatureSwitch::Change Without(bool world::EngineParts::*part) {
   };
 }
 
-// What is touched, alone and weightless: it meets nothing but the finger, and what is soft that by which it is held.
+// What is touched, alone and weightless: it meets nothing but the finger, and what is soft that by
+// which it is held.
 void Alone(Touch& touch) {
   std::vector<world::SceneBody>& bodies = touch.scene.bodies;
   const auto moving = std::find_if(bodies.begin(), bodies.end(),

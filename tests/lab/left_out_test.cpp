@@ -68,7 +68,8 @@ TEST_CASE("left out is switched out, to the bit, at a wall that no axis is norma
   }
 }
 
-// Joints, softness, surfaces with a stiffness of their own, and a place where the hand could not wait on the usual side.
+// Joints, softness, surfaces with a stiffness of their own, and a place where the hand could not wait
+// on the usual side.
 TEST_CASE("left out is switched out, to the bit, in the scenes that ship") {
   for (const char* name : {"door.sdf", "peg_in_hole.sdf", "soft_block.sdf", "stiff_wall.sdf"}) {
     const world::Scene scene =

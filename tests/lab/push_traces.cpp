@@ -9,6 +9,7 @@
 #include "protocol/impulse_units.h"
 #include "tests/lab/block_push.h"
 #include "tests/lab/choose.h"
+#include "tests/lab/coupling_column.h"
 
 namespace rikiseki::lab {
 namespace {
@@ -16,9 +17,6 @@ namespace {
 constexpr double kDuration = 1.5;  // s, by then every block rests or nearly so
 constexpr int kEvery = 5;          // ticks between two points
 
-constexpr Named<protocol::Coupling> kCouplings[] = {{"position", protocol::Coupling::kPosition},
-                                                    {"impulse", protocol::Coupling::kImpulse},
-                                                    {"local", protocol::Coupling::kLocal}};
 constexpr Named<PushScenario> kScenarios[] = {{"P", PushScenario::kPoke},
                                               {"H", PushScenario::kPush}};
 

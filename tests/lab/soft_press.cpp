@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "tests/lab/soft_press.h"
 
+#include <algorithm>
 #include <array>
 #include <ostream>
 
-#include "tests/lab/choose.h"
+#include "tests/lab/coupling_column.h"
 #include "tests/lab/soft_press_run.h"
 
 namespace rikiseki::lab {
@@ -17,10 +18,6 @@ constexpr double kLargestForceError = 0.01;  // of the force
 enum SoftColumn : std::size_t { kForce, kSwing, kExpected, kDent, kFlagged };
 const std::array<const char*, kFlagged + 1> kResults = {"force_n", "swing_n", "expected_n",
                                                         "dent_m", "flagged"};
-
-constexpr Named<protocol::Coupling> kCouplings[] = {{"position", protocol::Coupling::kPosition},
-                                                    {"impulse", protocol::Coupling::kImpulse},
-                                                    {"local", protocol::Coupling::kLocal}};
 
 Outcome RunRow(const Row& row, std::uint64_t /*seed*/) {
   SoftPress press;

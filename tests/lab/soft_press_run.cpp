@@ -26,7 +26,7 @@ double Compliance(const world::Scene& scene) {
 
 }  // namespace
 
-haptic::Settings SoftLoops::HapticSettings() const {
+haptic::Settings SoftSettings() {
   haptic::Settings settings;
   settings.loop.longest_world_period_ms = 200;
   return settings;
@@ -57,10 +57,9 @@ double ForceOf(const CoupledRun& run) {
   return ToVec3(run.haptic_tick().pointers[0].force).norm();
 }
 
-SoftPressed RunSoftPress(const SoftPress& press,
-                         const std::function<void(const CoupledRun&)>& at_end) {
+SoftPressed RunSoftPress(const SoftPress& press) {
   const world::Scene scene = SoftBlock(press.youngs_modulus_pa);
-  const haptic::Settings settings = press.loops.HapticSettings();
+  const haptic::Settings settings = SoftSettings();
   const double compliance = Compliance(scene);
   const double series = 1 / (1 / settings.render.stiffness_n_per_m + compliance);
   const double depth = std::min(0.008, press.force_n / series);
@@ -80,7 +79,7 @@ SoftPressed RunSoftPress(const SoftPress& press,
   }
   got.dent_m = compliance * (got.least_n + got.most_n) / 2;
   got.flagged = run->haptic_health().energy.flagged != 0;
-  if (at_end) at_end(*run);
+  got.books = run->haptic_health().books;
   return got;
 }
 

@@ -2,7 +2,6 @@
 // A finger on a soft block that stands on a floor, in both step functions: the paper's section 5.5.
 #pragma once
 
-#include <functional>
 #include <memory>
 
 #include "tests/lab/coupled_run.h"
@@ -16,9 +15,10 @@ struct SoftLoops {
   double rate_hz = 20;         // of the world
   double latency_periods = 0;  // of a frame
   protocol::Coupling coupling = protocol::Coupling::kLocal;
-
-  haptic::Settings HapticSettings() const;
 };
+
+/// As shipped, but for a world as slow as these.
+haptic::Settings SoftSettings();
 
 /// A floor and a block of 80 x 80 x 60 mm, without weight: its surface is exactly where its box is.
 world::Scene SoftBlock(double youngs_modulus_pa);
@@ -41,11 +41,10 @@ struct SoftPressed {
   double most_n = 0;
   double dent_m = 0;  // of the block, by the springs
   bool flagged = false;
+  protocol::Books books = {};  // at the end
 };
 
-/// A prescribed finger goes down within 0.2 s, near the middle of the top, and stays. The run as it
-/// ended goes to `at_end`.
-SoftPressed RunSoftPress(const SoftPress& press,
-                         const std::function<void(const CoupledRun&)>& at_end = {});
+/// A prescribed finger goes down within 0.2 s, near the middle of the top, and stays.
+SoftPressed RunSoftPress(const SoftPress& press);
 
 }  // namespace rikiseki::lab

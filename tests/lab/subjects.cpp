@@ -11,6 +11,7 @@
 
 #include "tests/lab/block_push.h"
 #include "tests/lab/choose.h"
+#include "tests/lab/coupling_column.h"
 
 namespace rikiseki::lab {
 namespace {
@@ -28,9 +29,6 @@ constexpr double kStartNoise = 0.002;
 constexpr double kHandNoise = 0.05;
 constexpr double kRunaway = 100;  // m
 
-constexpr Named<protocol::Coupling> kCouplings[] = {{"position", protocol::Coupling::kPosition},
-                                                    {"impulse", protocol::Coupling::kImpulse},
-                                                    {"local", protocol::Coupling::kLocal}};
 // numerics section 4, the device included.
 constexpr Named<haptic::Impedance> kSubjectHands[] = {
     {"light", {0.13, 2.2, 50}}, {"medium", {0.58, 6.7, 135}}, {"firm", {0.93, 15.2, 500}}};

@@ -30,7 +30,8 @@ struct Touch {
 };
 
 /// The touch of a scene as the daemons' defaults run it: of its first body that moves, or of its
-/// first one, from the side of -x, or from another if the hand cannot wait there. Throws std::invalid_argument for a scene without shapes.
+/// first one, from the side of -x, or from another if the hand cannot wait there. Throws
+/// std::invalid_argument for a scene without shapes.
 Touch TouchOf(const world::Scene& scene);
 
 struct TouchResult {

@@ -146,6 +146,10 @@ std::vector<LedgerReader::Increment> LedgerReader::IncrementsOf(const protocol::
   return increments;
 }
 
+bool LedgerReader::CanMove(std::uint32_t body, std::uint32_t generation) const {
+  return body < bodies_.size() && bodies_[body].movable && bodies_[body].generation == generation;
+}
+
 bool LedgerReader::Consume(const protocol::HapticTick& tick) {
   if (has_baseline_ && tick.tick <= last_tick_) return false;
   const std::uint64_t ticks = has_baseline_ ? tick.tick - last_tick_ : 1;
@@ -175,19 +179,15 @@ bool LedgerReader::Consume(const protocol::HapticTick& tick) {
     return true;
   }
 
-  const auto can_move = [&](const Increment& increment) {
-    return increment.body < bodies_.size() && bodies_[increment.body].movable &&
-           bodies_[increment.body].generation == increment.generation;
-  };
   for (const Increment& increment : increments) {
-    if (!can_move(increment)) continue;
+    if (!CanMove(increment.body, increment.generation)) continue;
     consumed_ns_ += InSi(increment.impulse).norm();
     consumed_nms_ += InSi(increment.angular_impulse).norm();
   }
   const bool gap = consumed_ns_ > std::min(largest_impulse_ns_, kLargestCountable) ||
                    consumed_nms_ > std::min(largest_impulse_ns_ * kLongestLever, kLargestCountable);
   for (const Increment& increment : increments) {
-    if (!can_move(increment)) {
+    if (!CanMove(increment.body, increment.generation)) {
       Discard(increment.impulse, DiscardReason::kUnknownBody);
     } else if (gap) {
       Discard(increment.impulse, DiscardReason::kGap);
@@ -228,9 +228,7 @@ std::span<const OwedPush> LedgerReader::Take() {
   life_books_.applied = Plus(life_books_.applied, sum);
   epoch_books_.applied = Plus(epoch_books_.applied, Minus(sum, sum_before));
   for (const KnownChannel& held : known_) {
-    if (held.body < bodies_.size() && held.generation == bodies_[held.body].generation) {
-      owed_[held.body].spring_j += held.spring_j;
-    }
+    if (CanMove(held.body, held.generation)) owed_[held.body].spring_j += held.spring_j;
   }
   consumed_ns_ = consumed_nms_ = 0;
   std::swap(taken_replay_, replay_);

@@ -141,6 +141,8 @@ class LedgerReader {
   /// Growth of every channel since the message before, `ticks` ago, which this one replaces.
   std::vector<Increment> IncrementsOf(const protocol::HapticTick& tick, std::uint64_t ticks,
                                       double length_s);
+  /// A body of the scene, in this generation, that may be pushed.
+  bool CanMove(std::uint32_t body, std::uint32_t generation) const;
   void Discard(const protocol::ImpulseUnits& impulse, protocol::DiscardReason reason);
 
   std::uint64_t own_epoch_;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Headers that no side may accept, whichever is judged: the player offers them, and sees that it is
-// left alone.
+// left alone. And the one that differs and must be taken: of a later minor version.
 #pragma once
 
 #include <span>

@@ -4,22 +4,10 @@
 #include <limits>
 #include <sstream>
 
-#include "tests/lab/report/sections.h"
+#include "tests/lab/report/error_rows.h"
 
 namespace rikiseki::lab {
 namespace {
-
-// The first row of a chapter in which every named column has that text; null if there is none.
-const ResultRow* FindRow(const std::vector<ResultRow>& rows,
-                         const std::vector<std::pair<std::string, std::string>>& columns) {
-  for (const ResultRow& row : rows) {
-    const bool fits = std::all_of(columns.begin(), columns.end(), [&](const auto& column) {
-      return row.Text(column.first) == column.second;
-    });
-    if (fits) return &row;
-  }
-  return nullptr;
-}
 
 std::string Largest(double stiffness) {
   return stiffness > 0 ? Short(stiffness) : "none";
@@ -183,27 +171,9 @@ void AnswerMass(const Results& results, Html& page) {
   page.Table({"world", "position", "impulse", "local"}, lines);
 }
 
-const ResultRow* ErrorRow(const Results& results, const std::string& system,
-                          const std::string& coupling, const std::string& period,
-                          const std::string& world_period) {
-  const std::string display = coupling == "local" ? "" : "interpolate";
-  for (const ResultRow& row : RowsOf(results, "error-vs-runtime")) {
-    const std::string substep = row.Text("substep_s");
-    if (row.Text("system") == system && row.Text("coupling") == coupling &&
-        row.Text("display") == display && row.Text("T_s") == period &&
-        row.Text("Tw_s") == world_period && row.Text("body_step") != "semi_implicit" &&
-        (substep.empty() || substep == "0.001")) {
-      return &row;
-    }
-  }
-  return nullptr;
-}
-
 std::string ErrorText(const ResultRow* row) {
-  return row == nullptr ? "" : Value(1e3 * row->Got("continuous_rms_m"));
+  return row == nullptr ? "" : Value(Error(*row));
 }
-
-const std::vector<std::string> kSystems = {"P", "H", "offcentre", "corner", "stack"};
 
 void AnswerSlowWorld(const Results& results, Html& page) {
   page.Subheading("What does a world at 10 Hz cost me?");
@@ -212,14 +182,14 @@ void AnswerSlowWorld(const Results& results, Html& page) {
       "worlds at 50, 20 and 10 Hz and haptics at 1 kHz; and the CPU of local, in % of a core.");
   std::vector<std::vector<std::string>> lines;
   double worst_local = 0;
-  for (const std::string& system : kSystems) {
+  for (const auto& [system, title] : kErrorSystems) {
     std::vector<std::string> line = {system};
     for (const std::string& coupling : kCouplingNames) {
       for (const char* world_period : {"0.02", "0.05", "0.1"}) {
         const ResultRow* row = ErrorRow(results, system, coupling, "0.001", world_period);
         line.push_back(ErrorText(row));
         if (coupling == "local" && row != nullptr && std::string(world_period) == "0.1") {
-          worst_local = std::max(worst_local, 1e3 * row->Got("split_rms_m"));
+          worst_local = std::max(worst_local, SplitError(*row));
         }
       }
     }
@@ -259,7 +229,7 @@ void AnswerFasterLoop(const Results& results, Html& page) {
     line.push_back(wall == nullptr ? "" : Value(1e-3 * wall->Got("Kmax_eig_N_m")));
     line.push_back(Short(1e3 * (2000 * period_s * period_s / 4 + 2 * period_s / 2)));
     const ResultRow* cost = nullptr;
-    for (const std::string& system : kSystems) {
+    for (const auto& [system, title] : kErrorSystems) {
       const ResultRow* row = ErrorRow(results, system, "local", ToField(period_s), "0.1");
       line.push_back(ErrorText(row));
       if (row != nullptr) cost = row;

@@ -20,10 +20,6 @@ const ResultRow* BestWithin(const ErrorRows& rows, double cpu_percent,
   return best;
 }
 
-double SplitError(const ResultRow& row) {
-  return 1e3 * row.Got("split_rms_m");
-}
-
 // Without what the haptic period itself gets wrong, which may cancel what a split does.
 void WriteSplitBudgets(const std::vector<ResultRow>& all, Html& page) {
   std::size_t cells = 0, won = 0;
@@ -60,8 +56,8 @@ std::string Why(const ErrorRows& locals, const ResultRow* local, const ResultRow
     return "the cheapest run with local costs " + Short(cheapest) +
            " %: copies of bodies and the replay of every tick are not free";
   }
-  const double split = 1e3 * local->Got("split_rms_m");
-  const double winner_split = 1e3 * winner.Got("split_rms_m");
+  const double split = SplitError(*local);
+  const double winner_split = SplitError(winner);
   const std::string winner_name = winner.Text("coupling");
   if (split < winner_split) {
     return "the split costs local " + Short(split) + " mm and " + winner_name + " " +

@@ -35,10 +35,32 @@ inline double Error(const ResultRow& row) {
   return 1e3 * row.Got("continuous_rms_m");
 }
 
+/// Likewise, against a single rate of the same haptic period [mm].
+inline double SplitError(const ResultRow& row) {
+  return 1e3 * row.Got("split_rms_m");
+}
+
 /// Of one core [%], of what diverged, too.
 inline double Cpu(const ResultRow& row) {
   const auto found = row.got.find("cpu_s_per_s");
   return found == row.got.end() ? 0 : 100 * found->second;
+}
+
+/// The row with planes interpolated, second-order copies and an engine that steps at 1 ms; null if there is none.
+inline const ResultRow* ErrorRow(const Results& results, const std::string& system,
+                                 const std::string& coupling, const std::string& period,
+                                 const std::string& world_period) {
+  const std::string display = coupling == "local" ? "" : "interpolate";
+  for (const ResultRow& row : RowsOf(results, "error-vs-runtime")) {
+    const std::string substep = row.Text("substep_s");
+    if (row.Text("system") == system && row.Text("coupling") == coupling &&
+        row.Text("display") == display && row.Text("T_s") == period &&
+        row.Text("Tw_s") == world_period && row.Text("body_step") != "semi_implicit" &&
+        (substep.empty() || substep == "0.001")) {
+      return &row;
+    }
+  }
+  return nullptr;
 }
 
 }  // namespace rikiseki::lab

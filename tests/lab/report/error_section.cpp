@@ -69,8 +69,7 @@ void WriteWorldPeriods(const std::vector<ResultRow>& all, Html& page) {
           continue;
         }
         // Below a micrometre nothing is told apart.
-        series.points.push_back(
-            {row->Number("Tw_s"), std::max(1e-3, 1e3 * row->Got("split_rms_m"))});
+        series.points.push_back({row->Number("Tw_s"), std::max(1e-3, SplitError(*row))});
       }
       std::sort(series.points.begin(), series.points.end(),
                 [](const PlotPoint& a, const PlotPoint& b) { return a.x < b.x; });
@@ -165,10 +164,10 @@ void WriteError(const Results& results, Html& page) {
       line.insert(line.end(), {"diverged", "", "", "", "", "", "", ""});
     } else {
       line.insert(line.end(),
-                  {Short(Error(row)), Short(1e3 * row.Got("split_rms_m")),
-                   Short(1e3 * row.Got("split_bias_m")), Short(1e3 * row.Got("split_sd_m")),
-                   Short(row.Got("impulse_rms_ns")), Short(row.Got("force_rms_n")),
-                   Short(1e3 * row.Got("injected_j")), Short(1e3 * row.Got("jump_m"))});
+                  {Short(Error(row)), Short(SplitError(row)), Short(1e3 * row.Got("split_bias_m")),
+                   Short(1e3 * row.Got("split_sd_m")), Short(row.Got("impulse_rms_ns")),
+                   Short(row.Got("force_rms_n")), Short(1e3 * row.Got("injected_j")),
+                   Short(1e3 * row.Got("jump_m"))});
     }
     line.insert(line.end(), {Short(Cpu(row)), Short(row.got.at("haptic_p50_us")),
                              Short(row.got.at("haptic_p999_us"))});

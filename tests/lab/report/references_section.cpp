@@ -160,10 +160,7 @@ std::size_t WriteReferences(const std::vector<Chapter>& chapters, const Results&
     const std::string chapter = std::string("reference_") + reference.chapter;
     const std::vector<ResultRow>& rows = RowsOf(results, chapter);
     if (rows.empty()) continue;
-    const auto missed =
-        static_cast<std::size_t>(std::count_if(rows.begin(), rows.end(), [](const ResultRow& row) {
-          return row.status == RowStatus::kMissed;
-        }));
+    const std::size_t missed = CountMissed(rows);
     if (counted != chapter) all_missed += missed;
     counted = chapter;
     const Deviation deviation = WorstOf(reference, rows);

@@ -3,32 +3,18 @@
 #include <cmath>
 #include <limits>
 
-#include "tests/lab/report/sections.h"
+#include "tests/lab/report/error_rows.h"
 
 namespace rikiseki::lab {
 namespace {
-
-// H at 1 kHz with planes interpolated, by coupling and world period.
-const ResultRow* PushOfH(const Results& results, const std::string& coupling,
-                         double world_period_s) {
-  for (const ResultRow& row : RowsOf(results, "error-vs-runtime")) {
-    if (row.Text("system") == "H" && row.Text("coupling") == coupling &&
-        row.Number("Tw_s") == world_period_s && row.Number("T_s") == 1e-3 &&
-        row.Text("display") == (coupling == "local" ? "" : "interpolate") &&
-        row.Text("body_step") != "semi_implicit") {
-      return &row;
-    }
-  }
-  return nullptr;
-}
 
 void WriteTenHertz(const Results& results, Html& page) {
   std::vector<std::vector<std::string>> lines;
   for (const std::string& coupling : kCouplingNames) {
     std::vector<std::string> line = {coupling};
     for (const char* column : {"continuous_rms_m", "force_rms_n", "force_step_n"}) {
-      for (const double world_period_s : {0.02, 0.1}) {
-        const ResultRow* row = PushOfH(results, coupling, world_period_s);
+      for (const char* world_period : {"0.02", "0.1"}) {
+        const ResultRow* row = ErrorRow(results, "H", coupling, "0.001", world_period);
         const double scale = std::string(column) == "continuous_rms_m" ? 1e3 : 1;
         line.push_back(row == nullptr ? "" : Value(scale * row->Got(column)));
       }
@@ -59,13 +45,10 @@ void WriteFriction(const std::vector<ResultRow>& rows, Html& page) {
     for (const std::string& coupling : kCouplingNames) {
       std::vector<std::string> line = {std::string(what) + ", " + coupling};
       for (const char* world_period : {"0.02", "0.05", "0.1", "0.2"}) {
-        for (const ResultRow& row : rows) {
-          if (row.Text("script") != script || row.Text("coupling") != coupling ||
-              row.Text("Tw_s") != world_period) {
-            continue;
-          }
-          line.push_back(Value(std::round(1e3 * row.Got("force_error_rms_n")) / 1e3));
-        }
+        const ResultRow* row =
+            FindRow(rows, {{"script", script}, {"coupling", coupling}, {"Tw_s", world_period}});
+        line.push_back(
+            row == nullptr ? "" : Value(std::round(1e3 * row->Got("force_error_rms_n")) / 1e3));
       }
       lines.push_back(line);
     }
@@ -88,7 +71,6 @@ void WriteFriction(const std::vector<ResultRow>& rows, Html& page) {
 
 void WriteDeformation(const std::vector<ResultRow>& rows, Html& page) {
   double worst = 0, swing = 0, least_mm = std::numeric_limits<double>::infinity(), most_mm = 0;
-  std::size_t missed = 0;
   for (const ResultRow& row : rows) {
     worst = std::max(worst, std::abs(row.Got("force_n") / row.Got("expected_n") - 1));
     swing = std::max(swing, row.Got("swing_n"));
@@ -96,7 +78,6 @@ void WriteDeformation(const std::vector<ResultRow>& rows, Html& page) {
       least_mm = std::min(least_mm, 1e3 * row.Got("dent_m"));
       most_mm = std::max(most_mm, 1e3 * row.Got("dent_m"));
     }
-    missed += row.status == RowStatus::kOk ? 0 : 1;
   }
   page.Paragraph(
       "5.5, deformation. Proposed in the paper as an experiment, without figures; built here, as a "
@@ -108,7 +89,7 @@ void WriteDeformation(const std::vector<ResultRow>& rows, Html& page) {
       " mN, and the block is dented by " + Short(least_mm) +
       (most_mm - least_mm < 0.01 * most_mm ? "" : " to " + Short(most_mm)) +
       " mm: at 60, 20 and 10 Hz, with every coupling and up to two periods of latency (" +
-      std::to_string(rows.size()) + " runs, " + std::to_string(missed) +
+      std::to_string(rows.size()) + " runs, " + std::to_string(CountMissed(rows)) +
       " of them off by more than 1 % or called unstable).");
   Repeat("soft-press", "soft-press", rows, page);
 }

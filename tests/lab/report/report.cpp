@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "tests/lab/report/report.h"
 
-#include <algorithm>
 #include <fstream>
 #include <numeric>
 #include <ostream>
@@ -51,10 +50,7 @@ std::size_t WriteBroken(const Results& results, Html& page) {
   std::size_t all = 0;
   for (const auto& [chapter, rows] : results) {
     if (chapter.starts_with("reference_")) continue;  // the last section has them
-    const auto broken =
-        static_cast<std::size_t>(std::count_if(rows.begin(), rows.end(), [](const ResultRow& row) {
-          return row.status == RowStatus::kMissed;
-        }));
+    const std::size_t broken = CountMissed(rows);
     if (broken > 0) {
       page.Warning(std::to_string(broken) + " of the " + std::to_string(rows.size()) + " rows of " +
                    chapter + " broke a bar that holds for every row.");

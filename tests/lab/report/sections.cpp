@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "tests/lab/report/sections.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -17,6 +18,23 @@ const std::vector<ResultRow>& RowsOf(const Results& results, const std::string& 
 
 std::string Value(double value, const std::string& unit) {
   return std::isfinite(value) ? Short(value) + unit : "diverged";
+}
+
+const ResultRow* FindRow(const std::vector<ResultRow>& rows,
+                         const std::vector<std::pair<std::string, std::string>>& columns) {
+  for (const ResultRow& row : rows) {
+    const bool fits = std::all_of(columns.begin(), columns.end(), [&](const auto& column) {
+      return row.Text(column.first) == column.second;
+    });
+    if (fits) return &row;
+  }
+  return nullptr;
+}
+
+std::size_t CountMissed(const std::vector<ResultRow>& rows) {
+  return static_cast<std::size_t>(std::count_if(rows.begin(), rows.end(), [](const ResultRow& row) {
+    return row.status == RowStatus::kMissed;
+  }));
 }
 
 std::vector<MassInterval> StableIntervals(const ResultRow& row) {

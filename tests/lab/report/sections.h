@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/lab/report/html.h"
@@ -34,6 +35,13 @@ std::size_t WriteReferences(const std::vector<Chapter>& chapters, const Results&
 
 /// The rows of a chapter; none where it was not run.
 const std::vector<ResultRow>& RowsOf(const Results& results, const std::string& chapter);
+
+/// The first row of a chapter in which every named column has that text; null if there is none.
+const ResultRow* FindRow(const std::vector<ResultRow>& rows,
+                         const std::vector<std::pair<std::string, std::string>>& columns);
+
+/// How many rows missed a result that they expect, or a bar that holds for all.
+std::size_t CountMissed(const std::vector<ResultRow>& rows);
 
 /// RMS over the subjects of `fig9` of the SD of where the cube stopped [m]; `subjects` is how many.
 double SpreadOf(const std::vector<ResultRow>& rows, const std::string& hand,
